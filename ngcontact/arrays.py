@@ -1,4 +1,4 @@
-"""Types of arrays, records, squares, normals, sparse arrays."""
+"""Types of arrays, records, squares, normals, sparse arrays, Newton's method."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ Index: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
 Integers: TypeAlias = NDArray[np.integer]
 
+NEWTON_STEPS = 30
 
 Record = TypeVar("Record")  # a dataclass of arrays that have a row for each of the same things
 Solve = Callable[[Array], Array]
@@ -110,6 +111,22 @@ def rotations(x: Array) -> Array:
     if x.shape[-1] == 2:
         return across(x)[..., None]
     return np.stack([np.cross(axis, x) for axis in np.eye(3)], axis=-1)
+
+
+def newton(
+    t: Array, step: Callable[[Array], Array], ends: tuple[float, float], rest: float
+) -> Array:
+    """Parameters (k,) after t - step(t), kept between both `ends`, was taken again and again.
+
+    Until no change is larger than `rest`.
+    """
+    for _ in range(NEWTON_STEPS):
+        new = np.clip(t - step(t), *ends)
+        moved = np.abs(new - t).max(initial=0.0)
+        t = new
+        if moved <= rest:
+            break
+    return t
 
 
 def for_components(S: sp.csr_array, d: int) -> sp.csr_array:

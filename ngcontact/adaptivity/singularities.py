@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask, joined
 from ..contact import ContactState, ending_segments
 from ..errors import warn
-from ..fem import BoundaryTrace
+from ..fem import BoundaryTrace, boundary_corners, prescribed_components
 from ..mesh import resolved_lengths
 from ..problem import MeshArrays, Problem
 
@@ -118,44 +118,16 @@ def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
 
 def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
     """Number (k,) of what is prescribed on each segment: one for equal conditions."""
-    segments, supports = np.arange(len(trace.region)), problem.displacement.items()
-    masks = [
-        trace.lies_on(segments, *(name for name, u in supports if u[axis] is not None))
-        for axis in (0, 1)
-    ]
-    masks += [trace.lies_on(segments, name) for name in problem.traction]
-    others = [(contact.secondary, contact.primary) for contact in problem.contact]
-    for names in [(problem.sliding, None), *others]:
-        masks += [trace.lies_on(segments, None if name is None else str(name)) for name in names]
-    return np.unique(np.array(masks), axis=1, return_inverse=True)[1].ravel()
-
-
-def _reentrant(trace: BoundaryTrace) -> Index:
-    """Vertices (j,) of the geometry at which a body has an angle of more than 180 degrees."""
-    angle = MeshArrays(trace.mesh).angles
-    outer = np.flatnonzero(~trace.inner)
-    segment, s = np.repeat(outer, 2), np.tile([0.0, 1.0], len(outer))
-    vertex = trace.nodes[outer][:, [0, -1]].ravel()
-    wide = angle[vertex] > np.pi
-    segment, s, vertex = segment[wide], s[wide], vertex[wide]
-    order = np.argsort(vertex, kind="stable")
-    first, second = order[:-1], order[1:]
-    met = vertex[first] == vertex[second]
-    first, second = first[met], second[met]
-    ends = trace.region[segment[first]] != trace.region[segment[second]]  # as CAD edges do
-    first, second = first[ends], second[ends]
-    one, other = (trace.exact_normal(segment[at], s[at]) for at in (first, second))
-    return vertex[first[np.linalg.norm(one - other, axis=1) > BLUNT_ANGLE]]
+    sides = [side for pair in problem.contact for side in pair.sides]
+    masks = [trace.lies_on(slice(None), x) for x in (*problem.traction, problem.guide, *sides)]
+    every = np.concatenate([prescribed_components(problem, trace), masks])
+    return np.unique(every, axis=1, return_inverse=True)[1].ravel()
 
 
 def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
     """Vertices where one condition ends and another begins, and those that point inwards."""
-    view = MeshArrays(trace.mesh)
-    outer = ~trace.inner
-    ends, kind = view.facets[outer].ravel(), np.repeat(_conditions(problem, trace)[outer], 2)
-    least, most = (np.full(trace.mesh.nv, start) for start in (kind.max(initial=0), -1))
-    np.minimum.at(least, ends, kind)
-    np.maximum.at(most, ends, kind)
-    changing, inwards = np.flatnonzero(least < most), _reentrant(trace)
-    turning = view.vertices[np.setdiff1d(changing, inwards)]
-    return joined([_at(turning, CHANGE_POWER), _at(view.vertices[inwards], CORNER_POWER)])
+    found, kind = boundary_corners(trace), _conditions(problem, trace)
+    ends, changing = (np.diff(x[found.sides])[:, 0] != 0 for x in (trace.region, kind))
+    inwards = ends & (found.angle > np.pi + BLUNT_ANGLE)  # where CAD edges end
+    x = trace.arrays.vertices[found.vertex]
+    return joined([_at(x[changing & ~inwards], CHANGE_POWER), _at(x[inwards], CORNER_POWER)])

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask
+from ..arrays import NEWTON_STEPS, Array, Index, Mask
 from ..reference.triangle import CENTRE, lagrange, lagrange_gradient
-from .projection import GRAZING_COSINE, MATCHING_DISTANCE, NEWTON_STEPS, PAIRS_AT_ONCE, Partners
+from .projection import GRAZING_COSINE, MATCHING_DISTANCE, PAIRS_AT_ONCE, Partners
 
 DEGREES = {3: 1, 6: 2, 10: 3}  # by the number of nodes
 NEAREST_FACETS = 8  # facets by their middles, at which a ray is tried before all others

@@ -159,8 +159,8 @@ def area_in_contact(zone: SignedDistance, state: ContactState) -> float:
     share = _positive_share(f) @ np.abs(np.linalg.det(nodes[parts]))
     facets = zone.segments[some]
     s, w = triangle.gauss(2 * zone.trace.geometry_order)
-    vectors = zone.trace.area_vector(np.repeat(facets, len(w)), np.tile(s, (len(facets), 1)))
-    size = np.linalg.norm(vectors, axis=1).reshape(len(facets), len(w)) @ w
+    area = zone.trace.surface_element(*zone.trace.at_places(facets, s))
+    size = area.reshape(len(facets), len(w)) @ w
     whole = np.ones(len(state.gap))
     covered = np.minimum(state.line.covered_shares(whole, whole)[some], 1.0)
     return float(share @ (size * covered))

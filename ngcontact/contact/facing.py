@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask, across, joined
+from ..arrays import Array, Index, Mask, across, joined, rows_of
 from ..fem import BoundaryTrace
 from ..lagrange import at
 from ..problem import Contact
@@ -204,38 +204,31 @@ def _clipped(
     outward = trace.side[facing, None, None] > 0
     other = np.where(outward, other, other[:, ::-1])  # anticlockwise from outside
     local, parts, number = clipping.pieces(corners, d[faces], other, far[faces])
-    local, number, share = faces[local], facing[number], np.abs(np.linalg.det(parts))
-    seen = _seen(trace, facets[local], parts.mean(axis=1), d[local], facing, number, share)
-    start = np.tile(triangle.CENTRE, (len(seen), 1))
-    return FacingPieces(local[seen], parts[seen], number[seen], start, share[seen])
+    start, share = np.tile(triangle.CENTRE, (len(local), 1)), np.abs(np.linalg.det(parts))
+    pieces = FacingPieces(faces[local], parts, facing[number], start, share)
+    return rows_of(pieces, _seen(trace, facets, pieces, d[pieces.local], facing))
 
 
 def _seen(
-    trace: BoundaryTrace,
-    own: Index,
-    place: Array,
-    d: Array,
-    facing: Index,
-    number: Index,
-    share: Array,
-) -> Index:
-    """Numbers (j,) of pieces of facets `own` (r,) that are not behind others or the own body.
+    trace: BoundaryTrace, facets: Index, pieces: FacingPieces, d: Array, facing: Index
+) -> Mask:
+    """Pieces (r,) of `facets` (k,) that are not behind others or the own body.
 
-    Of the pieces with middles `place` (r, 3) and shares (r,), `number` (r,) is what rays along `d`
-    (r, 3) meet of the facets `facing` (q,). Where all pieces of a facet make it up, none hides
-    another.
+    Of all of the facets `facing` (q,), along rays `d` (r, 3). Where all pieces of a facet make it
+    up, none hides another.
     """
-    covered = np.bincount(own, share)[own]
+    own, other = facets[pieces.local], pieces.facing
     middles = trace.curve[:, trace.corners].mean(axis=1)
-    ahead = ((middles[number] - middles[own]) * d).sum(axis=1) >= -SLIVER * trace.lengths(own)
-    seen = (np.abs(covered - 1) <= SLIVER) & ahead
+    ahead = ((middles[other] - middles[own]) * d).sum(axis=1) >= -SLIVER * trace.lengths(own)
+    whole = np.abs(pieces.covered(len(facets)) - 1) <= SLIVER
+    seen = np.asarray(whole[pieces.local] & ahead)
     asked = np.flatnonzero(~seen)
-    x = trace.point(own[asked], place[asked])
+    x = trace.point(own[asked], pieces.corners[asked].mean(axis=1))
     first = partners(trace, facing, own[asked], x, d[asked], nodes=False).segment
     vertices = trace.nodes[:, trace.corners]
-    beside = vertices[first][:, :, None] == vertices[number[asked]][:, None]  # itself, as a rule
+    beside = vertices[first][:, :, None] == vertices[other[asked]][:, None]  # itself, as a rule
     seen[asked] = (first >= 0) & beside.any(axis=(1, 2))
-    return np.flatnonzero(seen)
+    return seen
 
 
 def faced_vertices(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:

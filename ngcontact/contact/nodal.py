@@ -66,10 +66,9 @@ def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -
 
     Times the measure of the model.
     """
-    vectors = trace.area_vector(segment, s)
     if contact.direction is None:
-        return np.linalg.norm(vectors, axis=1)
-    return np.abs(vectors @ np.array(contact.direction))
+        return trace.surface_element(segment, s)
+    return np.abs(trace.area_vector(segment, s) @ np.array(contact.direction))
 
 
 def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:

@@ -6,18 +6,16 @@ in `BoundaryTrace.curve`; `side` (q,) is +1 where the outward normal lies to the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask, across
+from ..arrays import Array, Index, Mask, across, newton
 from ..lagrange import at, gauss_lobatto, lagrange, lagrange_derivative, slope, zeros
 
 MATCHING_DISTANCE = 1e-9  # distance, relative to a segment's length, below which two points are one
 GRAZING_COSINE = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
-NEWTON_STEPS = 20
 # Change of a parameter in [0, 1] at which Newton's method has arrived: the next one would be of
 # its square. Below 1e-15, the round-off of places, no change falls, and all steps were taken.
 NEWTON_TOLERANCE = 1e-12
@@ -93,17 +91,6 @@ def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Arra
     return np.concatenate(pairs, axis=1), np.concatenate(places)
 
 
-def _newton(s: Array, step: Callable[[Array], Array], settled: float = NEWTON_TOLERANCE) -> Array:
-    """Parameters (k,) in [0, 1] after s - step(s) has been repeated until it stands still."""
-    for _ in range(NEWTON_STEPS):
-        new = np.clip(s - step(s), 0, 1)
-        moved = np.abs(new - s).max(initial=0.0)
-        s = new
-        if moved <= settled:
-            break
-    return s
-
-
 def crossings(
     points: Array,
     normal: Array,
@@ -124,7 +111,7 @@ def crossings(
         rate = (slope(curve, segment, s) * normal).sum(axis=1)
         return np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0)
 
-    return _newton(s, step, settled)
+    return newton(s, step, (0, 1), settled)
 
 
 def cast(
@@ -224,4 +211,4 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
     def step(s: Array) -> Array:  # of Gauss and Newton: at once where the point is on the segment
         return -ahead(point, segment, s) / (slope(curve, segment, s) ** 2).sum(axis=1)
 
-    return segment, _newton(np.full(len(point), 0.5), step)
+    return segment, newton(np.full(len(point), 0.5), step, (0, 1), NEWTON_TOLERANCE)

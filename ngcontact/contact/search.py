@@ -137,9 +137,9 @@ def _facing(trace: BoundaryTrace, within: float) -> dict[tuple[str, str], _Sampl
             np.maximum(boxes[a, 0], boxes[b, 0]) > np.minimum(boxes[a, 1], boxes[b, 1]) + reach[b]
         ).any():
             continue
-        segment, s = np.repeat(parts[a], len(PLACES)), np.tile(PLACES, len(parts[a]))
+        segment, s = trace.at_places(parts[a], PLACES)
         points = trace.point(segment, s)
-        other = trace.point(np.repeat(parts[b], len(PLACES)), np.tile(PLACES, len(parts[b])))
+        other = trace.point(*trace.at_places(parts[b], PLACES))
         distance, _ = cKDTree(other).query(points, distance_upper_bound=reach[b])
         some = np.flatnonzero(np.isfinite(distance))
         gap, facing = _gaps(trace, segment[some], s[some], parts[b])

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask
 from ..fem import ORDERS
-from .line import ContactLine, by_line, in_contact, twins
+from .line import ContactLine, by_line, in_contact, links, twins
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -26,13 +26,12 @@ def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
 
     The two points at a corner of the line are neighbours without a distance.
     """
-    pairs = np.stack([line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()], axis=1)
-    links = np.concatenate([pairs[(pairs >= 0).all(axis=1)], twins(line)])
+    linked = np.concatenate([links(line), twins(line)])
     neighbours: dict[int, list[int]] = {}
-    for a, b in links.tolist():
+    for a, b in linked.tolist():
         neighbours.setdefault(a, []).append(b)
         neighbours.setdefault(b, []).append(a)
-    return neighbours, links
+    return neighbours, linked
 
 
 def _run_of_points(
@@ -91,13 +90,13 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     Between the two points at a corner it is the corner. The `gap` (m,) is that after deformation,
     points in contact are `active` (m,).
     """
-    neighbours, links = _neighbours(line)
+    neighbours, linked = _neighbours(line)
     active = in_contact(line, active)
     x, order = line.position, line.rows.shape[1] - 1
     ends, found, beyond = [], [], []
     inwards: list[Index] = []
     outwards: list[Index] = []
-    for link in links[active[links[:, 0]] != active[links[:, 1]]].tolist():
+    for link in linked[active[linked[:, 0]] != active[linked[:, 1]]].tolist():
         inner, outer = sorted(link, key=lambda i: not active[i])
         opened = _run_of_points(outer, inner, neighbours, active)
         closed = _run_of_points(inner, outer, neighbours, active)

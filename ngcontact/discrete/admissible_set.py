@@ -45,10 +45,10 @@ def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
 
 def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_0, (3.8): zero normal displacement at the nodes, with the exact normals."""
-    if problem.sliding is None:
+    if problem.guide is None:
         return no_conditions(trace.model.dim)
-    node = trace.nodes[trace.segments(str(problem.sliding))].ravel()
-    number, normal = trace.guide(str(problem.sliding))
+    node = trace.nodes[trace.segments(problem.guide)].ravel()
+    number, normal = trace.guide(problem.guide)
     _, first = np.unique(number, return_index=True)
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
 
@@ -68,9 +68,8 @@ def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
 
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
     """Segments (k,) on which conditions are posed: Gamma_u, Gamma_0, Gamma_K, the axis."""
-    sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
-    guides = [] if problem.sliding is None else [str(problem.sliding)]
-    chosen = trace.lies_on(np.arange(len(trace.region)), *problem.displacement, *guides, *sides)
+    sides = [side for pair in problem.contact for side in pair.sides]
+    chosen = trace.lies_on(slice(None), *problem.displacement, problem.guide, *sides)
     return np.flatnonzero(chosen | trace.on_axis)
 
 
@@ -89,9 +88,9 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
         axes = np.eye(d)[[function is not None for function in components]]
         count = trace.nodes[trace.segments(pattern)].size
         supports.append((pattern, np.broadcast_to(axes, (count, *axes.shape))))
-    if problem.sliding is not None:
-        number, normal = trace.guide(str(problem.sliding))
-        supports.append((str(problem.sliding), normal[number][:, None]))
+    if problem.guide is not None:
+        number, normal = trace.guide(problem.guide)
+        supports.append((problem.guide, normal[number][:, None]))
     every, held = [], np.zeros((n, d, d))  # sums of size a a' at nodes, a the directions
     for pattern, directions in supports:
         segments = trace.segments(pattern)

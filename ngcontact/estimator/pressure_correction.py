@@ -178,9 +178,9 @@ class _Forms:
                 if value is not None:
                     ds = ng.ds(definedon=mesh.Boundaries(pattern))
                     a += model.weighted(held * u.Trace()[axis] * v.Trace()[axis]) * ds
-        if problem.sliding is not None:
+        if problem.guide is not None:
             n = ng.specialcf.normal(2)
-            ds = ng.ds(definedon=mesh.Boundaries(str(problem.sliding)))
+            ds = ng.ds(definedon=mesh.Boundaries(problem.guide))
             a += model.weighted(held * (u.Trace() * n) * (v.Trace() * n)) * ds
         a.Assemble()
         return shared(a.mat)

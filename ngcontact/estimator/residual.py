@@ -147,8 +147,7 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     """Residuals on the `parts` of the boundary that no body faces."""
     boundary, problem = solution.boundary, solution.problem
     _, (segment, s, weight) = parts.points(2 * solution.order + DATA_BONUS)
-    ds = np.linalg.norm(boundary.derivative(segment, s), axis=1) * weight
-    ds *= boundary.measure(segment, s)
+    ds = boundary.surface_element(segment, s) * weight
 
     residual = -solution.traction(segment, s)  # (3.7)
     for pattern in problem.traction:
@@ -163,8 +162,8 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
             residual[at, axis] = factor[at, axis] = 0.0
         squares.append(_displacement(solution, boundary.segments(pattern), given))
     guided = np.zeros(len(segment), dtype=bool)
-    if problem.sliding is not None:  # (3.8): any force along the normal, none across it
-        guided = boundary.lies_on(segment, str(problem.sliding))
+    if problem.guide is not None:  # (3.8): any force along the normal, none across it
+        guided = boundary.lies_on(segment, problem.guide)
         points = BoundaryPoints(segment[guided], s[guided], ds[guided])
         normal = _guide_normals(solution, points)
         squares.append(_off_guide(solution, points, normal))
@@ -243,9 +242,8 @@ def _displacement(
 
 def _guide_normals(solution: ScaledSolution, points: BoundaryPoints) -> Array:
     """Unit vectors (k, 2) by which Gamma_0 is held at points of it."""
-    boundary = solution.boundary
-    segments = boundary.segments(str(solution.problem.sliding))
-    number, normal = boundary.guide(str(solution.problem.sliding))
+    boundary, guide = solution.boundary, str(solution.problem.guide)
+    segments, (number, normal) = boundary.segments(guide), boundary.guide(guide)
     nodal = normal[number].reshape(len(segments), -1, 2)
     return between_nodes(nodal[np.searchsorted(segments, points.segment)], points.s)[0]
 

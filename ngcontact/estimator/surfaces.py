@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, rows_of
@@ -42,23 +41,9 @@ class SurfacePoints:
 def _points(trace: BoundaryTrace, facets: Index, degree: int) -> SurfacePoints:
     """Points on whole `facets` (j,), exact for polynomials of a degree on straight ones."""
     s, w = triangle.gauss(degree)
-    every, places = np.repeat(facets, len(s)), np.tile(s, (len(facets), 1))
-    weight = _areas(trace, every, places) * np.tile(w, len(facets))
+    every, places = trace.at_places(facets, s)
+    weight = trace.surface_element(every, places) * np.tile(w, len(facets))
     return SurfacePoints(every, places, weight)
-
-
-def _areas(trace: BoundaryTrace, facets: Index, s: Array) -> Array:
-    """Areas (k,) per unit weight of `triangle.gauss` at `s` (k, 3) of `facets` (k,)."""
-    tangents = trace.derivative(facets, s)
-    return np.asarray(np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=1) / 2)
-
-
-def _traction(solution: ScaledSolution, points: SurfacePoints) -> Array:
-    """Traction sigma_h n (k, 3) over the unit of stress."""
-    trace = solution.boundary
-    stress = trace.evaluate(ng.BoundaryFromVolumeCF(solution.stress), points.facet, points.s)
-    normal = trace.normal(points.facet, points.s)
-    return np.einsum("kij,kj->ki", stress.reshape(-1, 3, 3), normal)
 
 
 def _residual(
@@ -85,7 +70,7 @@ def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTe
     """Residuals of (3.6), (3.7), (3.8) on `facets` (j,) of no pair; the rest is free."""
     problem, trace = solution.problem, solution.boundary
     points = _points(trace, facets, 2 * solution.order + DATA_DEGREE)
-    t, element = _traction(solution, points), trace.element[points.facet]
+    t, element = solution.traction(points.facet, points.s), trace.element[points.facet]
     held = np.zeros(t.shape, dtype=bool)
     miss = np.zeros(t.shape)
     for pattern, components in problem.displacement.items():
@@ -100,8 +85,8 @@ def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTe
         load = problem.traction_vector(pattern)
         t[at] -= trace.evaluate(load, points.facet[at], points.s[at]) / solution.unit  # (3.7)
     t[held] = 0.0
-    if problem.sliding is not None:  # (3.8): no shear
-        at = np.flatnonzero(trace.lies_on(points.facet, str(problem.sliding)))
+    if problem.guide is not None:  # (3.8): no shear
+        at = np.flatnonzero(trace.lies_on(points.facet, problem.guide))
         n = trace.normal(points.facet[at], points.s[at])
         t[at] -= (t[at] * n).sum(axis=1)[:, None] * n
     squares = 2 * solution.mu[element] / solution.diameter[element] * points.weight
@@ -176,16 +161,16 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     full = _in_contact(pair)[local]
     element = trace.element[own.facet]
     u = trace.evaluate(solution.displacement, own.facet, own.s)
-    t = _traction(solution, own) / np.abs(cosine)[:, None]
+    t = solution.traction(own.facet, own.s) / np.abs(cosine)[:, None]
     sides = [(element, t, 1.0)]
     distance = np.zeros(len(pi))
     if zone.contact.primary is not None:
         x = trace.point(own.facet, own.s)
         there, distance = opposite(trace, x, d, facing, each.opposite)
-        other = SurfacePoints(facing, there, weight)
         across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
         u = u - trace.evaluate(solution.displacement, facing, there)
-        sides.append((trace.element[facing], _traction(solution, other) / across[:, None], -1.0))
+        other = solution.traction(facing, there) / across[:, None]
+        sides.append((trace.element[facing], other, -1.0))
     if zone.contact.gap is not None:
         distance = prescribed_gap(
             zone.contact, trace, own.facet, own.s, trace.point(own.facet, own.s)
@@ -212,9 +197,10 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
         share = weight / len(sides)
         squares.append(Squares("penetration", e, depth * share))
         squares.append(Squares("complementarity", e, product * share))
-    free = np.concatenate([zone.segments[alone], zone.facing[~met]])
-    points = _points(trace, free, degree)
-    residuals.append(_residual(solution, points, "boundary", _traction(solution, points)))
+    rest = np.concatenate([zone.segments[alone], zone.facing[~met]])
+    points = _points(trace, rest, degree)
+    free = solution.traction(points.facet, points.s)
+    residuals.append(_residual(solution, points, "boundary", free))
     both_sides = np.concatenate([zone.segments, zone.facing])
     return BoundaryTerms(residuals, squares, NO_PARTS), both_sides
 
@@ -224,5 +210,5 @@ def _on_parts(
 ) -> SurfacePoints:
     """Points `s` (g, 3) with weights `w` (g,) of all parts, on their `facets` (r,)."""
     facet, places = np.repeat(facets, len(s)), parts.places(s)
-    weight = _areas(trace, facet, places) * (parts.share[:, None] * w).ravel()
+    weight = trace.surface_element(facet, places) * (parts.share[:, None] * w).ravel()
     return SurfacePoints(facet, places, weight)

@@ -151,10 +151,8 @@ class ScaledSolution:
         return Squares("loads", element, energy * self.measure[element])
 
     def traction(self, segment: Index, s: Array) -> Array:
-        """Traction sigma_h n (k, 2) over `unit`, at points `s` (k,) of each `segment` (k,)."""
-        on_boundary = ng.BoundaryFromVolumeCF(self.stress)
-        values = self.boundary.evaluate(on_boundary, segment, s).reshape(-1, 2, 2)
-        return np.einsum("kij,kj->ki", values, self.boundary.normal(segment, s))
+        """Traction sigma_h n (k, d) over `unit`, at points `s` (k, ...) of each `segment` (k,)."""
+        return self.boundary.traction(self.stress, segment, s)
 
 
 def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:

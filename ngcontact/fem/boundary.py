@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index, Mask, across, for_components, from_triplets, rightward
 from ..lagrange import at, gauss, gauss_lobatto, lagrange, slope
 from ..mesh import CadEdge, cad_edges
-from ..problem import POSITION, MeshArrays, boundary_mask
+from ..problem import POSITION, MeshArrays, Problem, boundary_mask
 from .model import PLANE, Model
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
@@ -209,6 +209,13 @@ class BoundaryTrace:
         vectors = -across(self.derivative(segment, s)) * self.side[segment, None]
         return vectors * self.measure(segment, s)[:, None] if self.model.extent else vectors
 
+    def surface_element(self, segment: Index, s: Array) -> Array:
+        """Size of the body (k,) per unit weight of a rule, at `s` (k,) of segments `segment` (k,).
+
+        Of lengths, or areas, times the measure of the body.
+        """
+        return np.linalg.norm(self.area_vector(segment, s), axis=1)
+
     def rule(self, degree: int) -> tuple[Array, Array]:
         """Parameters (g,) and weights (g,) on a segment, exact for polynomials of a `degree`."""
         return gauss(degree)
@@ -386,6 +393,12 @@ class BoundaryTrace:
         points["x"] = 1 - s  # NGSolve's segment runs from the second vertex to the first
         return np.asarray(function(points)).reshape(len(segment), function.dim)
 
+    def traction(self, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
+        """Traction sigma n (k, d) of a `stress` (d, d) on the body, with the mesh's normal."""
+        sigma = self.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s)
+        normal = self.normal(segment, s)
+        return np.einsum("kij,kj->ki", sigma.reshape(-1, *stress.dims), normal)
+
     def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
         """Number the nodes of several segments: once each, twice at a corner.
 
@@ -452,6 +465,37 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
         axis=axis[:, -1].astype(np.intp) - axis[:, 0],
         on_axis=np.asarray(axis.all(axis=1)),
     )
+
+
+def prescribed_components(problem: Problem, trace: BoundaryTrace) -> Mask:
+    """Components of the displacement that Gamma_u prescribes on each segment, (d, k)."""
+    supports, every = problem.displacement.items(), slice(None)
+    given = ((k for k, u in supports if u[axis] is not None) for axis in range(problem.dim))
+    return np.array([trace.lies_on(every, *patterns) for patterns in given])
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryCorners:
+    """Vertices at which two outer segments of a plane body meet, j of them."""
+
+    vertex: Index  # (j,)
+    sides: Index  # (j, 2), the segments
+    angle: Array  # (j,), of the body, by the normals of the geometry, radians
+
+
+def boundary_corners(trace: BoundaryTrace) -> BoundaryCorners:
+    """All vertices of the outer boundary but those in which a body touches itself."""
+    outer = np.flatnonzero(~trace.inner)
+    ends = trace.nodes[outer][:, trace.corners].ravel()
+    order = np.argsort(ends, kind="stable")
+    vertex, start, count = np.unique(ends[order], return_index=True, return_counts=True)
+    vertex, start = vertex[count == 2], start[count == 2]
+    sides = np.repeat(outer, 2)[order][start[:, None] + [0, 1]]
+    at_end = (trace.nodes[sides][..., -1] == vertex[:, None]).astype(float)
+    one, other = (trace.exact_normal(sides[:, k], at_end[:, k]) for k in (0, 1))
+    turn = np.arccos(np.clip((one * other).sum(axis=1), -1, 1))
+    inwards = trace.arrays.angles[vertex] > np.pi  # that of the mesh is near
+    return BoundaryCorners(vertex, sides, np.pi + np.where(inwards, turn, -turn))
 
 
 @dataclass(frozen=True, eq=False)

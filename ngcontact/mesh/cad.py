@@ -7,18 +7,16 @@ order. Everything here is in the edge's own parameter; arrays of points are (k, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
 
-from ..arrays import Array, across, rightward
+from ..arrays import Array, across, newton, rightward
 
 SAMPLES = 65  # points of an edge from which a projection starts
-NEWTON_STEPS = 30
 LEVEL_DISTANCE = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
-SPEED_CHANGE = 1e-9  # relative change of speed along an arc of a circle
 STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
 LONG_ARC = 0.5  # parameters from which an arc of an ellipse is fitted
 # Distance, relative to coordinates and axes, up to which a formula is its curve: their round-off.
@@ -36,7 +34,7 @@ class CadEdge:
         self._middle = (self.start + self.stop) / 2
         self.straight = False  # a straight segment with a constant derivative, as far as is known
         self._axes: Array | None = None
-        self._circle = False  # an arc of a circle, as far as is known
+        self.circle = False  # an arc of a circle, as far as is known
         self._x = self.point(self._t)
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())  # its extent, a length
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
@@ -62,8 +60,8 @@ class CadEdge:
         radius = across(slope)
         radius *= np.sign(radius @ (x - self._x[0]))  # outwards
         axes = np.stack([radius, slope])
-        self._circle = exact(x - radius, axes)
-        if self._circle:
+        self.circle = exact(x - radius, axes)
+        if self.circle:
             return np.vstack([x - radius, axes])
         if abs(self.stop - self.start) < LONG_ARC:  # cosines and sines would lose digits
             return None
@@ -77,12 +75,6 @@ class CadEdge:
     def name(self) -> str:
         """Boundary name."""
         return self._edge.name or ""
-
-    @cached_property
-    def uniform(self) -> bool:
-        """Whether its speed is constant, as on arcs of circles."""
-        speed = np.linalg.norm(self.derivative(self._t), axis=1)
-        return bool(np.ptp(speed) <= SPEED_CHANGE * speed.max())
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""
@@ -107,15 +99,9 @@ class CadEdge:
         return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
 
     def _newton(self, t: Array, step: Callable[[Array], Array]) -> Array:
-        """Iterate t - step(t), kept inside the interval, until it stands still."""
-        length = abs(self.stop - self.start)
-        for _ in range(NEWTON_STEPS):
-            new = np.clip(t - step(t), self.start, self.stop)
-            moved = np.abs(new - t).max(initial=0.0)
-            t = new
-            if moved <= NEWTON_TOLERANCE * length:
-                break
-        return t
+        """Parameters (k,) after t - step(t), kept inside the interval, stands still."""
+        rest = NEWTON_TOLERANCE * abs(self.stop - self.start)
+        return newton(t, step, (self.start, self.stop), rest)
 
     def project(self, points: Array) -> Array:
         """Parameters (k,) of the closest points of the edge to `points` (k, 2) near it."""
@@ -123,7 +109,7 @@ class CadEdge:
             along = self._x[-1] - self._x[0]
             s = (points - self._x[0]) @ along / (along @ along)
             return self.start + np.clip(s, 0, 1) * (self.stop - self.start)
-        if self._axes is not None and self._circle:
+        if self._axes is not None and self.circle:
             centre, a, b = self._axes
             offset = points - centre
             s = np.arctan2(offset @ b, offset @ a)

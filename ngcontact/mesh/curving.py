@@ -82,7 +82,7 @@ def check_curves(mesh: ng.Mesh) -> None:
     boundaries, length = MeshArrays(mesh).boundaries, resolved_lengths(mesh)
     for number, edge in enumerate(cad_edges(mesh) or []):
         shortest = float(length[boundaries == number].min(initial=np.inf))
-        small = edge.size < SMALL_EDGE and not (edge.straight or edge.uniform)
+        small = edge.size < SMALL_EDGE and not (edge.straight or edge.circle)
         if shortest < 1 or small:
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '

@@ -13,10 +13,9 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
 
-from ..arrays import Array, Index, Mask
+from ..arrays import NEWTON_STEPS, Array, Index, Mask
 from ..problem import MeshArrays
 
-NEWTON_STEPS = 30
 # Step on the surface, relative to the coordinates, at which Newton has arrived.
 NEWTON_TOLERANCE = 1e-15
 NORMAL_DIFFERENCE = 1e-12  # difference of unit normals up to which a face is plane

@@ -136,8 +136,7 @@ def _zone(solution: Solved, pair: int) -> Zone:
 def _symmetry_planes(solution: Solved, slack: float) -> list[tuple[Array, Array]]:
     """A point (3,) and the outward normal (3,) of each plane on which bodies slide."""
     trace = solution.discrete.space.trace
-    sliding = solution.problem.sliding
-    facets = trace.segments(sliding if isinstance(sliding, str) else None)
+    facets = trace.segments(solution.problem.guide)
     found: list[tuple[Array, Array]] = []
     for region in np.unique(trace.region[facets]):
         some = facets[trace.region[facets] == region]

@@ -43,8 +43,8 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
             message = f'displacement "{one.name}" jumps by {amount:.6g} along {AXES[one.axis]}'
             found.append(Contradiction((one.name, one.name), np.array(place), message, amount))
     largest = max((one.largest for one in supports), default=0.0)
-    names = list(problem.displacement)
-    if len(names) + (problem.sliding is not None) > 1:
+    names, guide = list(problem.displacement), problem.guide
+    if len(names) + (guide is not None) > 1:
         trace = boundary_trace(mesh, 1)
         x = trace.arrays.vertices
         low, high, least, most = _extremes(problem, trace)
@@ -57,8 +57,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
             message = f'displacement "{names[i]}" and "{names[j]}" prescribe {u:.6g} and {v:.6g} '
             message += f"along {AXES[at[0]]}"
             found.append(Contradiction((names[i], names[j]), x[at[1]], message, float(abs(u - v))))
-        if problem.sliding is not None:
-            guide = str(problem.sliding)
+        if guide is not None:
             facets = trace.segments(guide)
             facets = facets[known[:, trace.nodes[facets]].any(axis=(0, 2))]
             node, normal = trace.nodes[facets].ravel(), trace.exact_normal(*trace.at_nodes(facets))

@@ -29,6 +29,7 @@ from ..contact import (
     facing_pieces,
     in_contact,
     interpolated_rays,
+    links,
     opposite,
     partners,
     prescribed_gap,
@@ -152,18 +153,11 @@ class ContactZones:
     ends: Index  # (k,), intervals or facets with points in contact and open ones
 
 
-def _neighbours(state: ContactState) -> Index:
-    """Pairs (l, 2) of neighbouring points on one segment."""
-    one, other = state.line.rows[:, :-1].ravel(), state.line.rows[:, 1:].ravel()
-    both = np.flatnonzero((one >= 0) & (other >= 0))
-    return np.array([one[both], other[both]]).T
-
-
-def _labels(links: Index, count: int) -> Index:
-    """One number for each connected part of `count` points with `links` (l, 2), (count,)."""
+def _labels(linked: Index, count: int) -> Index:
+    """One number (count,) for each connected part of points, of which (l, 2) are `linked`."""
     label = np.arange(count)
-    while (label[links[:, 0]] != label[links[:, 1]]).any():  # of paths: as often as they halve
-        np.minimum.at(label, links, label[links].min(axis=1, keepdims=True))
+    while (label[linked[:, 0]] != label[linked[:, 1]]).any():  # of paths: as often as they halve
+        np.minimum.at(label, linked, label[linked].min(axis=1, keepdims=True))
         label = label[label]
     return label
 
@@ -174,7 +168,7 @@ def zones_of(state: ContactState) -> ContactZones:
     closed, parts = state.active, line.rows
     if line.dim == 2:
         closed = in_contact(line, closed) if len(corners) else closed
-        parts = np.concatenate([_neighbours(state), corners])
+        parts = np.concatenate([links(line), corners])
     met, opened = ((parts >= 0) & x[parts] for x in (closed, ~closed))
     first = parts[np.arange(len(parts)), met.argmax(axis=1)]
     label = _labels(np.array([(first[:, None] + 0 * parts)[met], parts[met]]).T, m)
@@ -264,7 +258,7 @@ def _samples_of_lines(trace: BoundaryTrace, state: ContactState) -> _Samples:
     least, most = gap[rows].min(axis=1), high[rows].max(axis=1)
     near = np.flatnonzero((2 * least < most) & ~state.active[rows].all(axis=1))
     local = whole[near[np.argsort(least[near], kind="stable")[:MOST_SEGMENTS]]]
-    segment, s = np.repeat(line.segments[local], len(PLACES)), np.tile(PLACES, len(local))
+    segment, s = trace.at_places(line.segments[local], PLACES)
     x, d = trace.point(segment, s), trace.normal(segment, s)
     if contact.direction is not None:
         d = np.tile(contact.direction, (len(s), 1))
@@ -385,7 +379,7 @@ def drawn_gap_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, f
     Means weighted by force; 0 where normals do not turn or the bodies are drawn touching. Errors up
     to `PEAK_ERROR` are upper bounds.
     """
-    line, force, along = state.line, np.abs(state.force), _neighbours(state)
+    line, force, along = state.line, np.abs(state.force), links(state.line)
     weight = force[along].sum(axis=1)
     if not weight.any():
         return 0.0, 0.0

@@ -17,14 +17,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import ngsolve as ng
 import numpy as np
 
 from ..adaptivity import END_POWER, RefinementTree, corners
 from ..arrays import Array, Mask, by_field
 from ..discrete import discretise, minimise_energy
 from ..errors import ContactError, ConvergenceError, warn
-from ..fem import BoundaryTrace, boundary_trace, model_of
+from ..fem import (
+    BoundaryTrace,
+    boundary_corners,
+    boundary_trace,
+    model_of,
+    prescribed_components,
+)
 from ..lagrange import gauss, lagrange
 from ..mesh import cad_edges, check_curves, resolved_lengths
 from ..problem import MeshArrays, Problem
@@ -234,28 +239,23 @@ def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh
     """
     every = np.arange(len(trace.region))
     normal = trace.exact_normal(every, np.full(len(every), 0.5))
-    guide = trace.lies_on(every, None if problem.sliding is None else str(problem.sliding))
-    held = guide.copy()
-    for name, given in problem.displacement.items():
-        on, axes = trace.lies_on(every, name), [k for k in (0, 1) if given[k] is not None]
-        held |= on
-        if len(axes) == 1:
-            guide |= on & (np.abs(normal[:, axes[0]]) > 1 - RIGHT_ANGLE_ERROR**2)
+    given = prescribed_components(problem, trace)
+    across = np.abs(normal.T) > 1 - RIGHT_ANGLE_ERROR**2
+    guide = trace.lies_on(every, problem.guide)
+    held = guide | given.any(axis=0)
+    guide |= (given & across).any(axis=0) & ~given.all(axis=0)
     touching = np.unique(mesh.segments[mesh.closed])
     touching = np.union1d(touching, mesh.partner[touching])
     natural = ~held & ~np.isin(mesh.segments, touching).all(axis=1)
     free = natural & ~trace.lies_on(every, *problem.traction)
     straight = np.array([edge.straight for edge in mesh.edges])[trace.region]
-    regular, angle = np.zeros(len(mesh.vertices), dtype=bool), MeshArrays(mesh.source).angles
-    outer = np.flatnonzero(~trace.inner)
-    for vertex in np.unique(mesh.segments[outer]):
-        at = outer[(mesh.segments[outer] == vertex).any(axis=1)]
-        if len(at) == 2 and angle[vertex] < np.pi + BLUNT_ANGLE:
-            convex = angle[vertex] < np.pi - BLUNT_ANGLE
-            one, other = trace.exact_normal(at, (mesh.segments[at, 1] == vertex).astype(float))
-            mirrored = (guide & straight)[at].any() and abs(one @ other) < RIGHT_ANGLE_ERROR
-            smooth = natural[at].all() if convex else free[at].all()
-            regular[vertex] = (convex and mirrored) or smooth
+    found = boundary_corners(trace)
+    convex = found.angle < np.pi - BLUNT_ANGLE
+    right = np.abs(np.cos(found.angle)) < RIGHT_ANGLE_ERROR
+    mirrored = (guide & straight)[found.sides].any(axis=1) & right
+    smooth = np.where(convex, *(x[found.sides].all(axis=1) for x in (natural, free)))
+    regular = np.zeros(len(mesh.vertices), dtype=bool)
+    regular[found.vertex] = (found.angle < np.pi + BLUNT_ANGLE) & ((convex & mirrored) | smooth)
     return regular
 
 
@@ -319,7 +319,6 @@ def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
     """
     trace, order = solution.discrete.space.trace, solution.order
     s, _ = gauss(2 * SAMPLES_PER_NODE * order)
-    stress = ng.BoundaryFromVolumeCF(solution.stress)
     reach = np.abs(solution.displacement.vec.FV().NumPy()).max()
     for number, state in enumerate(solution.pairs):
         line = state.line
@@ -334,11 +333,10 @@ def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
             return f"pair {number} penetrates by {-gap.min():.2g} at ({x[0]:.6g}, {x[1]:.6g})"
         inside = line.segments[closed]
         inside = inside[~np.isin(trace.nodes[inside], tips).any(axis=1)]
-        segment, places = np.repeat(inside, len(s)), np.tile(s, len(inside))
-        sigma = trace.evaluate(stress, segment, places).reshape(-1, 2, 2)
-        normal = trace.normal(segment, places)
-        pressure = -np.einsum("ki,kij,kj->k", normal, sigma, normal)
+        places = trace.at_places(inside, s)
+        traction = trace.traction(solution.stress, *places)
+        pressure = -(traction * trace.normal(*places)).sum(axis=1)
         if pressure.min(initial=0.0) < -PRESSURE_ERROR * pressure.max(initial=0.0):
-            x = trace.point(segment, places)[pressure.argmin()]
+            x = trace.point(*places)[pressure.argmin()]
             return f"pair {number} is under tension at ({x[0]:.6g}, {x[1]:.6g})"
     return None

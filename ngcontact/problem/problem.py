@@ -122,6 +122,11 @@ class Problem:
         """The dimension of the bodies, and of vectors."""
         return 3 if self.model == SOLID else 2
 
+    @property
+    def guide(self) -> str | None:
+        """Gamma_0, `sliding`, as one pattern; None without."""
+        return None if self.sliding is None else str(self.sliding)
+
     def refuse_solids(self, what: str) -> None:
         """Raise a `ValueError` for solids, which `what` does not serve."""
         if self.dim == 3:

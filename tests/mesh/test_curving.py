@@ -186,7 +186,7 @@ def test_arcs_are_those_of_the_geometry_kernel(angle, turned):
         if not CadEdge(edge).straight
     ]
     edge = CadEdge(arc)
-    assert edge._circle
+    assert edge.circle
     t = np.linspace(edge.start, edge.stop, 37)
     for found, exact in ((edge.point(t), arc.Value), (edge.derivative(t), arc.Tangent)):
         expected = np.array([(v.x, v.y) for v in map(exact, t.tolist())])

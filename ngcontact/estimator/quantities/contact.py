@@ -7,7 +7,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...contact import ContactState, in_contact
-from ...fem import Bodies, BoundaryTrace, connected_bodies
+from ...fem import Bodies, BoundaryTrace, connected_bodies, prescribed_components
 from ...lagrange import gauss
 from ...solved import Solved
 from ..residual import Estimated
@@ -49,7 +49,7 @@ def peak_of(
     off = factor * _off_stress(pair, boundary, solution.stress)
     if star is not None:
         off = np.maximum(off, STAR_FACTOR * _off_star(pair, star))
-    segment, s = np.repeat(line.segments, len(SAMPLES)), np.tile(SAMPLES, len(line.segments))
+    segment, s = boundary.at_places(line.segments, SAMPLES)
     every = np.repeat(rows, len(SAMPLES), axis=0)
     samples = (np.append(pressure, 0.0)[every] * boundary.shapes(segment, s)).sum(axis=1)
     errors = np.append(off, 0.0)[every].max(axis=1)
@@ -87,11 +87,10 @@ def _off_stress(
     segment, s = boundary.at_nodes(pair.line.segments)
     segment, s, point = segment[point >= 0], s[point >= 0], point[point >= 0]
     if len(point):
-        traction = boundary.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s)
-        sigma, normal = traction.reshape(-1, 2, 2), boundary.normal(segment, s)
-        d = pair.line.direction[point]
-        traction = np.einsum("ki,kij,kj->k", d, sigma, normal) / np.abs((normal * d).sum(axis=1))
-        np.maximum.at(result, point, np.abs(traction + pair.pressure[point]))
+        d, normal = pair.line.direction[point], boundary.normal(segment, s)
+        along = (boundary.traction(stress, segment, s) * d).sum(axis=1)
+        along /= np.abs((normal * d).sum(axis=1))
+        np.maximum.at(result, point, np.abs(along + pair.pressure[point]))
     return result
 
 
@@ -158,7 +157,7 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     places, (t, w) = boundary.places(line.segments), gauss(boundary.geometry_order + 2)
     width = np.diff(places, axis=1)
     s = places[:, :-1, None] + width[:, :, None] * t
-    ds = _line_element(boundary, np.repeat(line.segments, s[0].size), s.ravel())
+    ds = boundary.surface_element(np.repeat(line.segments, s[0].size), s.ravel())
     sizes = width * (ds.reshape(s.shape) @ w)
     one, other = closed[:, :-1], closed[:, 1:]
     whole = one & other & line.faces[:, None]
@@ -187,12 +186,6 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     return max(area, 0.0), error + float((sizes.sum(axis=1) * bent).sum())
 
 
-def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:
-    """Ds (k,) over the parameter, as the model weighs lengths."""
-    ds = np.linalg.norm(boundary.derivative(segment, s), axis=1)
-    return np.asarray(ds * boundary.measure(segment, s))
-
-
 def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
     """Size of the force at points that supports hold, which no row has; of the element's size.
 
@@ -206,8 +199,8 @@ def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
     if not len(some):
         return 0.0
     t, w = gauss(boundary.order + boundary.geometry_order + 1)
-    segment, s = np.repeat(line.segments[some], len(t)), np.tile(t, len(some))
-    share = boundary.shapes(segment, s) * _line_element(boundary, segment, s)[:, None]
+    segment, s = boundary.at_places(line.segments[some], t)
+    share = boundary.shapes(segment, s) * boundary.surface_element(segment, s)[:, None]
     share = np.abs(np.einsum("kgi,g->ki", share.reshape(len(some), len(t), -1), w))
     return HELD_POINT_FACTOR * float(((share * held[some]).sum(axis=1) * beside[some]).sum())
 
@@ -272,11 +265,9 @@ def _sides(state: ContactState, bodies: Bodies) -> list[tuple[float, int]]:
 def _held(solution: Solved, bodies: Bodies, body: int) -> Array:
     """Mean (2,) over a body's supports of what they prescribe, NaN where nothing is."""
     problem, trace = solution.problem, solution.discrete.space.trace
-    own = np.flatnonzero(bodies.of_segment == body)
     result = np.full(2, np.nan)
-    for axis in (0, 1):
-        given = [name for name, u in problem.displacement.items() if u[axis] is not None]
-        at = own[trace.lies_on(own, *given)]
+    for axis, given in enumerate(prescribed_components(problem, trace)):
+        at = np.flatnonzero(given & (bodies.of_segment == body))
         if len(at):
             result[axis] = _boundary_mean(solution, at)[axis]
     return result
@@ -286,6 +277,6 @@ def _boundary_mean(solution: Solved, segments: Index) -> Array:
     """Mean displacement (2,) on `segments` (k,), weighted as the model weighs lengths."""
     trace = solution.discrete.space.trace
     t, w = gauss(trace.order + 2 * trace.geometry_order)
-    at, s = np.repeat(segments, len(t)), np.tile(t, len(segments))
-    weights = _line_element(trace, at, s) * np.tile(w, len(segments))
-    return np.asarray((weights @ trace.evaluate(solution.displacement, at, s)) / weights.sum())
+    places = trace.at_places(segments, t)
+    weights = trace.surface_element(*places) * np.tile(w, len(segments))
+    return np.asarray((weights @ trace.evaluate(solution.displacement, *places)) / weights.sum())

@@ -289,7 +289,7 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
         facet, s = trace.at_nodes(line.segments)
         pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
     else:
-        facet, s = np.repeat(line.segments, 3), np.tile(np.eye(3), (len(line.segments), 1))
+        facet, s = trace.at_places(line.segments, trace.vertices)
         pressure = pressure_at_vertices(trace, state).ravel()
     at = np.argmax(pressure)
     mean, peak = float(state.force.sum()) / area if area > 0 else 0.0, float(pressure[at])

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arrays import Array, Index, Mask
 from ...contact import ContactState, in_contact
-from ...fem import BoundaryTrace, von_mises
+from ...fem import BoundaryTrace, boundary_corners, prescribed_components, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
 from ..residual import Estimated
 from .table import Quantity, Singular, error_of_largest, unknown
@@ -38,32 +38,16 @@ def singular_corners(
     problem: Problem, trace: BoundaryTrace, pairs: Sequence[ContactState]
 ) -> Singular:
     """Corners of all bodies at which the stress is infinite, by angles and conditions."""
-    mesh, kind = MeshArrays(trace.mesh), _conditions(problem, trace)
-    # Vertices of the boundary, and the two segments that meet at each.
-    outer = np.flatnonzero(~trace.inner)
-    ends = mesh.facets[outer].ravel()
-    order = np.argsort(ends, kind="stable")
-    vertex, start, count = np.unique(ends[order], return_index=True, return_counts=True)
-    start, vertex = start[count == 2], vertex[count == 2]
-    segment = np.repeat(outer, 2)[order]
-    first, second = segment[start], segment[start + 1]
-    # Angles of the body, by the normals of the geometry.
-    one, other = (
-        trace.exact_normal(at, (mesh.facets[at, 1] == vertex).astype(float))
-        for at in (first, second)
-    )
-    turn = np.arccos(np.clip((one * other).sum(axis=1), -1, 1))
-    angle = np.pi + np.where(mesh.angles[vertex] > np.pi, turn, -turn)
-    corner = (np.abs(angle - np.pi) > STRAIGHT_TURN) | (kind[first] != kind[second])
-    vertex, first, second, angle = vertex[corner], first[corner], second[corner], angle[corner]
-
-    place, body = mesh.vertices[vertex], trace.body[first]
+    corners, kind = boundary_corners(trace), _conditions(problem, trace)
+    sides, angle = kind[corners.sides], corners.angle
+    corner = (np.abs(angle - np.pi) > STRAIGHT_TURN) | (sides[:, 0] != sides[:, 1])
+    first, second = corners.sides[corner].T
+    sides, angle = sides[corner].T, angle[corner]
+    place, body = trace.arrays.vertices[corners.vertex[corner]], trace.body[first]
     h = np.maximum(trace.lengths(first), trace.lengths(second))
     closed, rigid = _closed(pairs, place, h)
-    sides = np.sort([kind[first], kind[second]], axis=0)
-    sides[(sides == PRESSED) & ~closed] = FREE
-    low, high = np.sort(sides, axis=0)
-    critical = np.full(len(vertex), np.pi)
+    low, high = np.sort(np.where((sides == PRESSED) & ~closed, FREE, sides), axis=0)
+    critical = np.full(len(place), np.pi)
     critical[(high == GUIDED) | ((low == GUIDED) & (high == HELD))] = np.pi / 2
     clamped = (low == FREE) & (high == HELD)
     critical[clamped] = _clamped_angles(problem, trace)[body[clamped]]
@@ -92,13 +76,9 @@ def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
     kind = np.full(len(segments), FREE)
     for pair in problem.contact:
         kind[trace.lies_on(segments, pair.secondary, pair.primary)] = PRESSED
-    guided = trace.lies_on(segments, None if problem.sliding is None else str(problem.sliding))
-    components = [
-        trace.lies_on(segments, *[b for b, u in problem.displacement.items() if u[i] is not None])
-        for i in (0, 1)
-    ]
-    kind[guided | components[0] | components[1] | trace.on_axis] = GUIDED
-    kind[components[0] & components[1]] = HELD
+    given = prescribed_components(problem, trace)
+    kind[trace.lies_on(segments, problem.guide) | given.any(axis=0) | trace.on_axis] = GUIDED
+    kind[given.all(axis=0)] = HELD
     return kind
 
 

@@ -19,7 +19,8 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
     boundary = solution.mesh.Boundaries(line.contact.secondary)
     if not isinstance(trace, FacetTrace):
         values, s = _at_nodes(trace, state), trace.places(line.segments)
-        return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
+        field = ng.GridFunction(ng.SurfaceL2(trace.mesh, order=trace.order, definedon=boundary))
+        return _fitted(field, trace, line.segments, s, values)
     whole = np.ones(len(state.force))
     mean = line.covered_shares(state.force / line.weight, whole)  # over whole facets
     if trace.order == 3:
@@ -32,8 +33,8 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
     values = np.maximum(values, 0.0)
     values[~values.any(axis=1)] = 1.0
     values *= (mean / values.mean(axis=1))[:, None]
-    s = np.tile(np.eye(3), (len(values), 1))
-    return _by_facet(trace, boundary, 1, line.segments, s, values, 0 * values + 1)
+    field = ng.GridFunction(ng.SurfaceL2(trace.mesh, order=1, definedon=boundary))
+    return _fitted(field, trace, line.segments, np.tile(np.eye(3), (len(values), 1)), values)
 
 
 def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
@@ -66,17 +67,18 @@ def pressure_at_vertices(trace: FacetTrace, state: ContactState) -> Array:
     return np.asarray((total / np.where(area > 0, area, 1.0))[at])
 
 
-def _by_facet(
+def _fitted(
+    field: ng.GridFunction,
     trace: BoundaryTrace,
-    boundary: ng.Region,
-    degree: int,
     segments: Index,
     s: Array,
     values: Array,
-    weights: Array,
+    weights: Array | None = None,
 ) -> ng.GridFunction:
-    """Polynomials on `segments` (k,), nearest to `values` (k, g) at `s` by `weights` (k, g)."""
-    field = ng.GridFunction(ng.SurfaceL2(trace.mesh, order=degree, definedon=boundary))
+    """The discontinuous `field` made nearest to `values` (k, g) at `s` of `segments` (k,).
+
+    By `weights` (k, g), equal ones when left out.
+    """
     if not len(segments):
         return field
     space, (k, g) = field.space, values.shape
@@ -92,7 +94,8 @@ def _by_facet(
         element = space.GetFE(ng.ElementId(ng.BND, int(segments[some[0]])))
         points = at[some[0]].tolist()
         shapes[some] = np.array([element.CalcShape(x, y, 0.0).NumPy() for x, y in points])
-    weighted = np.einsum("kg,kgi->kig", weights, shapes)
+    weighted = shapes if weights is None else weights[..., None] * shapes
+    weighted = weighted.transpose(0, 2, 1)
     found = np.linalg.solve(weighted @ shapes, weighted @ values[..., None])[..., 0]
     numbers = [space.GetDofNrs(ng.ElementId(ng.BND, int(i))) for i in segments]
     field.vec.FV().NumPy()[np.array(numbers)] = found
@@ -111,16 +114,15 @@ def _mean_traction(
     touched = np.append(state.active, False)[line.rows].any(axis=1)
     facets = line.segments[touched]
     points, weights = triangle.gauss(2 * d)
-    facet, s = np.repeat(facets, len(weights)), np.tile(points, (len(facets), 1))
+    facet, s = trace.at_places(facets, points)
     directions, x = rays(trace, line.contact, facet, s), trace.point(facet, s)
-    stress = ng.BoundaryFromVolumeCF(solution.stress)
+    stress = solution.stress
 
     def traction(facet: Index, s: Array, directions: Array) -> Array:
         """Pressures (j,) along `directions` (j, 3), over areas as these see them."""
-        sigma = trace.evaluate(stress, facet, s).reshape(-1, 3, 3)
-        normal = trace.normal(facet, s)
-        across = (normal * directions).sum(axis=1)
-        return np.asarray(-np.einsum("ki,kij,kj->k", directions, sigma, normal) / across)
+        both = trace.traction(stress, facet, s), trace.normal(facet, s)
+        along, across = ((x * directions).sum(axis=1) for x in both)
+        return np.asarray(-along / across)
 
     values = traction(facet, s, directions)
     if len(line.facing):
@@ -132,4 +134,5 @@ def _mean_traction(
     values = values.reshape(size.shape)
     own = (size * values).sum(axis=1) / size.sum(axis=1)
     values += (mean[touched] - own)[:, None]
-    return _by_facet(trace, boundary, d, facets, s, values, size)
+    field = ng.GridFunction(ng.SurfaceL2(trace.mesh, order=d, definedon=boundary))
+    return _fitted(field, trace, facets, s, values, size)
