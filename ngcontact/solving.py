@@ -19,12 +19,11 @@ from .adaptivity import (
     check_bool,
     continued,
     corners,
-    doerfler,
     next_plan,
     unresolvable,
     warn_of_limit,
 )
-from .arrays import joined, root_of_squares
+from .arrays import Array, joined, root_of_squares
 from .contact import with_roles
 from .discrete import (
     DiscreteProblem,
@@ -37,7 +36,7 @@ from .discrete import (
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
 from .estimator import earlier_figures, refuse_bound
 from .fem import boundary_trace, check_element, model_of, unknowns
-from .mesh import check_curves, copied, curve, first_mesh, same_geometry
+from .mesh import check_curves, curve, first_mesh, same_geometry
 from .plausibility import (
     EXACT_ESTIMATE,
     at_round_off,
@@ -47,7 +46,7 @@ from .plausibility import (
     refinement_warning,
     warn_of_implausible,
 )
-from .problem import Contact, MeshArrays, Problem, bisect
+from .problem import Contact, MeshArrays, Problem
 from .quadrature import evaluations, sample_data, unresolved, warn_of_unresolved
 from .results import with_progress
 from .solution import Solution
@@ -196,26 +195,10 @@ def solve_on(
         else:
             active = carried_active_set(discrete.lines, start.pairs)
         minimiser = minimise_energy(discrete, active)
-        return Solution(
-            problem=problem,
-            mesh=mesh,
-            order=order,
-            element=element,
-            displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
-            discrete=discrete,
-            minimiser=minimiser,
-            work={
-                "assemblies": sum(one.assembled for one in tried),
-                "factorizations": minimiser.factorizations,
-                "back_solves": minimiser.back_solves,
-                "gap_searches": sum(line.searches for one in tried for line in one.lines),
-                "curved_elements": curved,
-                "estimates": 0,
-                "equilibrations": 0,
-                "evaluations": evaluations() - before,
-            },
-            tree=RefinementTree(mesh, np.arange(mesh.ne)),
-        )
+        tree = RefinementTree(mesh, np.arange(mesh.ne))
+        solution = Solution.of(minimiser, tried, element, curved, tree=tree)
+        solution.work["evaluations"] = evaluations() - before
+        return solution
 
     first = None
     try:
@@ -348,8 +331,7 @@ def adapt(
             "both values; make them equal there, or leave guaranteed out"
         )
     warn_of_implausible(problem, mesh, refinement.order)
-    run = levels(problem, mesh, refinement, start) if problem.dim == 2 else None
-    solutions = with_warnings(run or levels_of_solids(problem, mesh, refinement))
+    solutions = with_warnings(levels(problem, mesh, refinement, start))
     return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
 
 
@@ -427,9 +409,10 @@ def _first_plan(
     problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None
 ) -> Plan:
     """The first level, of which nothing is forecast but by `start`."""
-    places = unresolvable([one.place for one in contradictions(problem, mesh)])
-    found = joined([corners(problem, boundary_trace(mesh, 1)), places])
-    tree = RefinementTree(mesh, np.arange(mesh.ne))
+    found, tree = unresolvable([]), RefinementTree(mesh, np.arange(mesh.ne))
+    if problem.dim == 2:
+        found = unresolvable([one.place for one in contradictions(problem, mesh)])
+        found = joined([corners(problem, boundary_trace(mesh, 1)), found])
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)
     if start is None or _is_exact(start):
         return plan
@@ -464,11 +447,13 @@ def levels(
     # Bound over estimate, by the last bound that was made.
     ratio, warned, plan = BOUND_RATIO, False, _first_plan(problem, mesh, refinement, start)
     while unknowns(plan.mesh, plan.order, element) <= refinement.max_dofs:
+        earlier: tuple[Array, ...] = ()
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
+            earlier = earlier_figures(solution)
         solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
         problem = solution.problem  # roles that fail are exchanged once
-        solution = replace(solution, adaptive=True, tree=plan.tree)
+        solution = replace(solution, adaptive=True, tree=plan.tree, earlier=earlier)
         unresolved_data = unresolved(problem, solution.mesh, in_bounds=guaranteed)
         error = math.inf
         if guaranteed:
@@ -511,40 +496,6 @@ def levels(
         warn(
             f"the {what} is {error:.2e}, more than tolerance={goal:g}: the next level would exceed "
             f"max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
-        )
-
-
-def levels_of_solids(
-    problem: Problem, mesh: ng.Mesh, refinement: Refinement
-) -> Generator[Solution]:
-    """Levels of solids from a first mesh on: one marking each, nothing is planned ahead."""
-    order, element, goal = refinement.order, refinement.element, refinement.tolerance or 0.0
-    solution: Solution | None = None
-    while unknowns(mesh, order, element) <= refinement.max_dofs:
-        if solution is not None:  # its factorisation is of no use to the next one
-            solution.discrete.systems.forget()
-        earlier = () if solution is None else earlier_figures(solution)
-        solution = solve_on(problem, mesh, order, element, solution)
-        solution = replace(solution, adaptive=True, earlier=earlier)
-        problem = solution.problem
-        yield solution
-        error = solution.relative_error_estimate  # infinite where the first mesh meets no contact
-        if not np.isfinite(solution.error_estimate):
-            raise ConvergenceError(
-                f"the error estimate is {solution.error_estimate}, so nothing can be refined; "
-                "choose units in which the squares of loads and displacements are numbers",
-                iterate=solution.minimiser,
-            )
-        log.info("%s", solution)
-        if error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution):
-            return
-        mesh = copied(solution.mesh)
-        bisect(mesh, doerfler(solution.indicators, refinement.theta))
-        mesh, _ = curve(mesh, order, element)
-    if solution is not None and goal and error > goal:
-        warn(
-            f"the estimate is {error:.2e}, more than tolerance={goal:g}: the next level would "
-            f"exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
         )
 
 

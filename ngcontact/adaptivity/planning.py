@@ -11,8 +11,8 @@ import numpy as np
 from ..arrays import Array, Index, Mask, across, joined, root_of_squares
 from ..estimator import Estimated
 from ..fem import ORDERS, check_element, jumping_moduli, unknowns
-from ..mesh import curve, unresolved
-from ..problem import MeshArrays
+from ..mesh import copied, curve, unresolved
+from ..problem import MeshArrays, bisect
 from .marking import doerfler, mark_alike
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact
@@ -133,8 +133,11 @@ def next_plan(
     By its indicators, but for those that no mesh makes less. Marked are Doerfler's elements and
     those in which contact ends, known to the square of their size as the energy is to that of the
     relative error. Elements in which moduli jump are refined together, and nothing is forecast. In
-    elements `narrow` (ne,) data are narrower than these.
+    elements `narrow` (ne,) data are narrower than these. Of solids Doerfler's elements are marked,
+    once, and nothing is forecast.
     """
+    if solution.problem.dim == 3:
+        return _next_of_solids(solution, refinement, last)
     problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
     small = below_resolution(mesh, last.corners.unresolvable)
     indicators = np.where(small, 0.0, solution.indicators)
@@ -174,6 +177,13 @@ def next_plan(
     mesh, _ = curve(refining.finished(), order, refinement.element)
     tree = replace(last.tree, element=last.tree.element[refining.origin])
     return Plan(mesh, order, last.corners, share * error, growth, tree, stuck, unresolved(mesh))
+
+
+def _next_of_solids(solution: Estimated, refinement: Refinement, last: Plan) -> Plan:
+    mesh = copied(solution.mesh)
+    bisect(mesh, doerfler(solution.indicators, refinement.theta))
+    mesh, _ = curve(mesh, last.order, refinement.element)
+    return replace(last, mesh=mesh, tree=RefinementTree(mesh, np.arange(mesh.ne)))
 
 
 @dataclass(frozen=True)

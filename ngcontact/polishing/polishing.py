@@ -274,23 +274,8 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
     minimiser = minimise_energy(replace(discrete, program=known), zone)
     if not np.array_equal(minimiser.active, zone):
         raise ConvergenceError("contact alone cannot hold a body", iterate=minimiser)
-    counts = {
-        "assemblies": 1,
-        "factorizations": minimiser.factorizations,
-        "back_solves": minimiser.back_solves,
-        "gap_searches": sum(line.searches for line in discrete.lines),
-        "curved_elements": int(np.count_nonzero(discrete.space.trace.curved_segments)),
-    }
-    return Solved(
-        problem=problem,
-        mesh=curved,
-        order=order,
-        element=ELEMENT,
-        displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
-        discrete=discrete,
-        minimiser=minimiser,
-        work=counts | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
-    )
+    bent = int(np.count_nonzero(discrete.space.trace.curved_segments))
+    return Solved.of(minimiser, [discrete], ELEMENT, bent)
 
 
 def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:

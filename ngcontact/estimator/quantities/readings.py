@@ -298,7 +298,12 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
 
 
 def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
-    """Figures (c, 8) of a level of solids and the one before it, which the next level needs."""
+    """Figures (c, 8) of a level of solids and the one before it, which the next level needs.
+
+    None of plane bodies, whose errors need no other levels.
+    """
+    if solution.problem.dim == 2:
+        return ()
     now = np.array([figures(solution, state)[0] for state in solution.pairs])
     return (*solution.earlier, now)[-EARLIER_LEVELS:]
 
