@@ -116,9 +116,9 @@ def rotations(x: Array) -> Array:
 def newton(
     t: Array, step: Callable[[Array], Array], ends: tuple[float, float], rest: float
 ) -> Array:
-    """Parameters (k,) after t - step(t), kept between both `ends`, was taken again and again.
+    """Parameters (k,), from `t` (k,), after t - step(t) was taken again and again.
 
-    Until no change is larger than `rest`.
+    Kept between both `ends`, until no change is larger than `rest`.
     """
     for _ in range(NEWTON_STEPS):
         new = np.clip(t - step(t), *ends)

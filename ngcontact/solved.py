@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 import ngsolve as ng
 import numpy as np
@@ -16,9 +16,6 @@ from .discrete import DiscreteProblem, RigidMotion, resultants
 from .fem import FacetTrace, energy_norm, model_of, normal_stress_of, potential_energy, stress_of
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
-
-if TYPE_CHECKING:
-    from typing import Self  # of Python 3.11
 
 STRESS_FREE = 1e-12  # norm of a stress, relative to the terms that cancel in it: round-off
 
@@ -35,39 +32,6 @@ class Solved:
     discrete: DiscreteProblem
     minimiser: Iterate
     work: dict[str, int] = field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls,
-        minimiser: Iterate,
-        tried: Sequence[DiscreteProblem],
-        element: str,
-        curved: int,
-        **others: Any,
-    ) -> Self:
-        """The solution that a `minimiser` of the last of the discrete problems `tried` is.
-
-        With the counts of what these took, and so many `curved` elements.
-        """
-        discrete = tried[-1]
-        work = {
-            "assemblies": sum(one.assembled for one in tried),
-            "factorizations": minimiser.factorizations,
-            "back_solves": minimiser.back_solves,
-            "gap_searches": sum(line.searches for one in tried for line in one.lines),
-            "curved_elements": curved,
-        }
-        return cls(
-            problem=discrete.problem,
-            mesh=discrete.space.trace.mesh,
-            order=discrete.space.trace.order,
-            element=element,
-            displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
-            discrete=discrete,
-            minimiser=minimiser,
-            work=work | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
-            **others,
-        )
 
     @property
     def stress(self) -> ng.CoefficientFunction:
@@ -230,6 +194,42 @@ class Solved:
         `complementarity`: sum of force times gap over force times length.
         """
         return kkt_residuals(self.discrete.program, self.minimiser)
+
+
+Kind = TypeVar("Kind", bound=Solved)
+
+
+def made_of(
+    kind: type[Kind],
+    minimiser: Iterate,
+    tried: Sequence[DiscreteProblem],
+    element: str,
+    curved: int,
+    **others: Any,
+) -> Kind:
+    """The solution that a `minimiser` of the last of the discrete problems `tried` is.
+
+    With the counts of what these took, `curved` elements, and `others`, further fields of its kind.
+    """
+    discrete = tried[-1]
+    work = {
+        "assemblies": sum(one.assembled for one in tried),
+        "factorizations": minimiser.factorizations,
+        "back_solves": minimiser.back_solves,
+        "gap_searches": sum(line.searches for one in tried for line in one.lines),
+        "curved_elements": curved,
+    }
+    return kind(
+        problem=discrete.problem,
+        mesh=discrete.space.trace.mesh,
+        order=discrete.space.trace.order,
+        element=element,
+        displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
+        discrete=discrete,
+        minimiser=minimiser,
+        work=work | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
+        **others,
+    )
 
 
 def full_stress(solution: Solved) -> ng.CoefficientFunction:

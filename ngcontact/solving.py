@@ -50,6 +50,7 @@ from .problem import Contact, MeshArrays, Problem
 from .quadrature import evaluations, sample_data, unresolved, warn_of_unresolved
 from .results import with_progress
 from .solution import Solution
+from .solved import made_of
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 COARSE_RUN_FROM = 20_000
@@ -196,7 +197,7 @@ def solve_on(
             active = carried_active_set(discrete.lines, start.pairs)
         minimiser = minimise_energy(discrete, active)
         tree = RefinementTree(mesh, np.arange(mesh.ne))
-        solution = Solution.of(minimiser, tried, element, curved, tree=tree)
+        solution = made_of(Solution, minimiser, tried, element, curved, tree=tree)
         solution.work["evaluations"] = evaluations() - before
         return solution
 

@@ -394,7 +394,10 @@ class BoundaryTrace:
         return np.asarray(function(points)).reshape(len(segment), function.dim)
 
     def traction(self, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
-        """Traction sigma n (k, d) of a `stress` (d, d) on the body, with the mesh's normal."""
+        """Traction sigma n (k, d) of a `stress` (d, d), by normals of the mesh.
+
+        At `s` (k,) of segments `segment` (k,).
+        """
         sigma = self.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s)
         normal = self.normal(segment, s)
         return np.einsum("kij,kj->ki", sigma.reshape(-1, *stress.dims), normal)

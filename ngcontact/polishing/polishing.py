@@ -34,7 +34,7 @@ from ..lagrange import gauss, lagrange
 from ..mesh import cad_edges, check_curves, resolved_lengths
 from ..problem import MeshArrays, Problem
 from ..solution import Solution
-from ..solved import Solved
+from ..solved import Solved, made_of
 from .geometric_mesh import (
     CORNER_RATIO,
     END_RATIO,
@@ -275,7 +275,7 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
     if not np.array_equal(minimiser.active, zone):
         raise ConvergenceError("contact alone cannot hold a body", iterate=minimiser)
     bent = int(np.count_nonzero(discrete.space.trace.curved_segments))
-    return Solved.of(minimiser, [discrete], ELEMENT, bent)
+    return made_of(Solved, minimiser, [discrete], ELEMENT, bent)
 
 
 def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
