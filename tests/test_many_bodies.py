@@ -66,11 +66,11 @@ def test_a_bearing_with_twelve_rollers():
         displacement={"rim": (0, 0), "bore": (0, -1e-2)},
         contact=pairs,
     )
-    levels = list(adapt(problem, order=2, max_dofs=12_000))
-    # Rollers that nothing holds cost no steps: measured 4 and 5, and 7 and 13 by proximal steps.
+    levels = list(adapt(problem, order=2, max_dofs=12_500))
+    # Rollers that nothing holds cost no steps: measured 4 and 6, and 7 and 13 by proximal steps.
     assert all(len(level.steps) <= 6 for level in levels)
-    # ... and few back-solves: measured 39.
-    assert levels[-1].work["back_solves"] <= 48
+    # ... and few back-solves: measured 15.
+    assert levels[-1].work["back_solves"] <= 24
     # They start where they touched, at as many points of a finer mesh.
     known = levels[-2].pairs
     start = by_line(levels[-1].discrete.lines, carried_active_set(levels[-1].discrete.lines, known))

@@ -194,8 +194,11 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
         (point, segment), s = _candidates(points, normal, curve)
         return segment, crossings(points[point], normal[point], curve, segment, s)
 
+    degree = curve.shape[1] - 1
+    velocity = np.einsum("ji,qid->qjd", lagrange_derivative(degree, gauss_lobatto(degree)), curve)
+
     def ahead(point: Index, segment: Index, s: Array) -> Array:
-        return ((points[point] - at(curve, segment, s)) * slope(curve, segment, s)).sum(axis=1)
+        return ((points[point] - at(curve, segment, s)) * at(velocity, segment, s)).sum(axis=1)
 
     block = max(1, PAIRS_AT_ONCE // max(1, curve.size))  # each pair holds its curve
     found = [np.zeros((2, 0), dtype=np.intp)]
@@ -208,7 +211,11 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
         found.append(np.stack([point[passed], segment[passed]]))
     point, segment = np.concatenate(found, axis=1)
 
-    def step(s: Array) -> Array:  # of Gauss and Newton: at once where the point is on the segment
-        return -ahead(point, segment, s) / (slope(curve, segment, s) ** 2).sum(axis=1)
+    def step(s: Array) -> Array:
+        apart, v = points[point] - at(curve, segment, s), at(velocity, segment, s)
+        square = (v**2).sum(axis=1)
+        rate = square - (apart * slope(velocity, segment, s)).sum(axis=1)
+        # Gauss's and Newton's where that of Newton leads to a farthest point.
+        return -(apart * v).sum(axis=1) / np.where(rate > 0, rate, square)
 
     return segment, newton(np.full(len(point), 0.5), step, (0, 1), NEWTON_TOLERANCE)

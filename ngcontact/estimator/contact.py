@@ -335,7 +335,9 @@ def at_nodes(
     for other in pairs if (line.rows < 0).any() else ():
         if other is pair:
             continue
-        at = np.flatnonzero(np.isnan(pressure).ravel() & np.isin(nodes, other.line.node))
+        theirs = np.zeros(boundary.space.ndof, dtype=bool)
+        theirs[other.line.node] = True
+        at = np.flatnonzero(np.isnan(pressure).ravel() & theirs[nodes])
         if at.size == 0:
             continue
         d = boundary.exact_normal(segment[at], s[at])
