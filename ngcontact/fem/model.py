@@ -13,11 +13,11 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..problem import AXIS_RADIUS, Elastic, Hooke, InitialStrain, MeshArrays, on_axis
+from ..problem import AXIS_RADIUS, Elastic, Hooke, MeshArrays, on_axis
 
 CF: TypeAlias = ng.CoefficientFunction
 Laws: TypeAlias = Mapping[str, Elastic | Hooke]
-Strains: TypeAlias = Mapping[str, tuple[Elastic | Hooke, InitialStrain]]
+Strains: TypeAlias = Mapping[str, tuple[Elastic | Hooke, CF]]
 
 MERIDIAN = (0, 1, 3)  # components of rr, zz, hoop, rz without the hoop
 
@@ -31,20 +31,24 @@ class Model:
     bonus = 0  # quadrature orders above the default that its forms need
     polynomial = True  # whether the stress of a polynomial displacement is one of one degree less
     extent = 0  # powers of a length in `measure`
+    components: tuple[int, ...] = (0, 1, 3)  # of an initial strain, those of Voigt strains
+    bulges = True  # whether strains normal to the plane act in it
 
     def strain(self, u: CF) -> CF:
         """Voigt strain (q,) of a displacement or trial function, e_ij in HH81 (2.6)."""
         grad = ng.Grad(u)
         return ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))  # (2.6)
 
-    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
-        """Voigt strain (q,) that leaves a body of initial strain `e` without stress in the plane.
+    def initial_strain(self, law: Elastic | Hooke, e: CF) -> CF:
+        """Voigt strain (q,) that leaves a body without stress in the plane.
 
-        The normal part, which has no way out in plane strain, bulges the plane by nu times itself.
+        Of an initial strain with the components `e` (6,). The normal part, which has no way out in
+        plane strain, bulges the plane by nu times itself.
         """
-        if isinstance(law, Hooke):  # which has no normal part, as `Problem.check` sees to
-            return ng.CF((e.xx, e.yy, e.shear))
-        return ng.CF((e.xx + law.nu * e.normal, e.yy + law.nu * e.normal, e.shear))
+        rows = np.eye(6, dtype=object)[list(self.components)]
+        if self.bulges and isinstance(law, Elastic):  # others have no such part: `Problem.check`
+            rows[:2, 2] = law.nu
+        return ng.CF(tuple(rows.ravel().tolist()), dims=rows.shape) * e
 
     def stress(self, C: CF, e: CF) -> CF:
         """Voigt stress (q,) of a strain `e` (q,) by the law `C` (q, q), tau_ij in HH81 (2.6)."""
@@ -95,7 +99,7 @@ class Model:
         """
         nu = {body: law.nu for body, law in materials.items() if isinstance(law, Elastic)}
         normal = mesh.MaterialCF(nu, default=0) * (voigt[0] + voigt[1])
-        held = {k: law.E * e.normal for k, (law, e) in strains.items() if isinstance(law, Elastic)}
+        held = {k: law.E * e[2] for k, (law, e) in strains.items() if isinstance(law, Elastic)}
         return normal - mesh.MaterialCF(held, default=0) if held else normal
 
     def hoop(self, normal: CF) -> CF:
@@ -110,8 +114,7 @@ class Model:
 class _PlaneStress(Model):
     """A thin sheet, free to change its thickness."""
 
-    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
-        return ng.CF((e.xx, e.yy, e.shear))
+    bulges = False
 
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         return ng.CF(0.0)
@@ -124,6 +127,8 @@ class _Axisymmetric(Model):
     bonus = 1  # order 2 has points on the sides of elements, where r may be 0
     polynomial = False
     extent = 1
+    components = (0, 1, 2, 3)
+    bulges = False
 
     def strain(self, u: CF) -> CF:
         rr, zz, rz = super().strain(u)
@@ -132,9 +137,6 @@ class _Axisymmetric(Model):
             tiny = AXIS_RADIUS * float(MeshArrays(u.space.mesh).vertices[:, 0].max())
             hoop = ng.IfPos(ng.x - tiny, hoop, rr)
         return ng.CF((rr, zz, hoop, rz))  # (2.6)
-
-    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
-        return ng.CF((e.xx, e.yy, e.normal, e.shear))
 
     def work(self, C: CF, u: CF, v: CF) -> list[CF]:
         # Of gradients, with hoop strains, of these alone: half the time of all at once.

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import ngsolve as ng
 
-from ..problem import Elastic, Hooke, InitialStrain
 from .model import CF, Laws, Model, Strains
 
 
@@ -15,14 +14,13 @@ class _Solid(Model):
 
     dim = 3
     motions = (True,) * 6  # translations along and rotations about x, y and z
+    components = (0, 1, 2, 4, 5, 3)
+    bulges = False
 
     def strain(self, u: CF) -> CF:
         g = ng.Grad(u)
         shear = (g[1, 2] + g[2, 1], g[0, 2] + g[2, 0], g[0, 1] + g[1, 0])
         return ng.CF((g[0, 0], g[1, 1], g[2, 2], *shear))  # (2.6)
-
-    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
-        return ng.CF((e.xx, e.yy, e.normal, e.yz, e.xz, e.shear))
 
     def volume(self, u: CF) -> CF:
         return ng.Trace(ng.Grad(u))

@@ -17,7 +17,6 @@ from ..linalg import shared
 from ..problem import (
     Elastic,
     Hooke,
-    InitialStrain,
     MeshArrays,
     Problem,
     body_mask,
@@ -186,8 +185,9 @@ def initial_load(problem: Problem, V: ng.FESpace, trace: BoundaryTrace) -> Array
     model, v, f = model_of(problem), V.TestFunction(), ng.LinearForm(V)
     rough = rough_moduli(problem, V.mesh)
     for body, law in problem.materials.items():
-        stress = model.stress(law.voigt(problem.model), e0)
-        density = model.weighted(ng.InnerProduct(stress, model.strain(v))).Compile()
+        # Once at each point: a function of another mesh looks for it there.
+        stress = ng.CacheCF(model.stress(law.voigt(problem.model), e0))
+        density = model.weighted(ng.InnerProduct(stress, model.strain(v)))
         for dx in _form_measures(trace, body, body in problem.varying, rough):
             f += density * dx
     f.Assemble()
@@ -298,9 +298,9 @@ def _scaled_energy(
 
 def initial_strains(
     problem: Problem, mesh: ng.Mesh
-) -> dict[str, tuple[Elastic | Hooke, InitialStrain]]:
-    """Law and initial strain of each body of a mesh that has one, by its own name."""
-    found: dict[str, tuple[Elastic | Hooke, InitialStrain]] = {}
+) -> dict[str, tuple[Elastic | Hooke, ng.CoefficientFunction]]:
+    """Law and initial strain (6,) of each body of a mesh that has one, by its own name."""
+    found: dict[str, tuple[Elastic | Hooke, ng.CoefficientFunction]] = {}
     for pattern, data in problem.strain.items():
         mine = body_mask(mesh, pattern)
         for key, law in problem.materials.items():

@@ -367,8 +367,8 @@ def check_about_axis(
     radials += [("displacement", k, u[0]) for k, u in displacement.items() if u[0] is not None]
     radials += [("force", name, F[0]) for name, F in force.items()]
     for name, e in strain.items():
-        sizes = e.xx, e.normal
-        radials += [("strain", name, ng.CF((x, *sizes))) for x in (e.xx - e.normal, e.shear / 2)]
+        sizes = e[0], e[2]
+        radials += [("strain", name, ng.CF((x, *sizes))) for x in (e[0] - e[2], e[3] / 2)]
     for what, name, radial in radials:
         if what in ("force", "strain"):
             at, ends, vb = body_mask(mesh, name)[view.bodies], view.elements, ng.VOL

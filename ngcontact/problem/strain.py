@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -21,15 +21,15 @@ RIGHT = {
 SHAPES = {2: [(), (1,), (2,), (3,), (2, 2)], 3: [(), (1,), (3,), (3, 3)]}
 
 
-class InitialStrain(NamedTuple):
-    """Components of an initial strain e0, scalars; about an axis rr, zz, the hoop's, rz."""
-
-    xx: ng.CoefficientFunction
-    yy: ng.CoefficientFunction
-    normal: ng.CoefficientFunction  # to the plane: zz of solids
-    shear: ng.CoefficientFunction  # the engineering one, gamma_xy
-    yz: ng.CoefficientFunction  # and those of solids, gamma_yz, gamma_xz
-    xz: ng.CoefficientFunction
+# Components of an initial strain, xx, yy, the one normal to the plane, the engineering shear
+# gamma_xy, and of solids gamma_yz, gamma_xz, by the places of their parts in the data of a size.
+PLACES = {
+    1: [[0], [0], [0], [], [], []],
+    2: [[0], [1], [], [], [], []],
+    3: [[0], [1], [2], [], [], []],
+    4: [[0], [3], [], [1, 2], [], []],
+    9: [[0], [4], [8], [1, 3], [5, 7], [2, 6]],
+}
 
 
 def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
@@ -54,18 +54,14 @@ def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
     return ng.CF(entries, dims=shape) if len(shape) == 2 else ng.CF(entries)
 
 
-def strain_components(data: ng.CoefficientFunction) -> InitialStrain:
-    """The components of what `strain_data` returned."""
-    zero = ng.CF(0.0)
-    if data.dim == 1:
-        return InitialStrain(data, data, data, zero, zero, zero)
-    if data.dim >= 4:
-        d = int(data.dims[0])
-        shear = {(i, j): data[i, j] + data[j, i] for i in range(d) for j in range(i)}
-        normal, yz, xz = (data[2, 2], shear[2, 1], shear[2, 0]) if d == 3 else (zero,) * 3
-        return InitialStrain(data[0, 0], data[1, 1], normal, shear[1, 0], yz, xz)
-    normal = data[2] if data.dim == 3 else zero
-    return InitialStrain(data[0], data[1], normal, zero, zero, zero)
+def strain_components(data: ng.CoefficientFunction) -> ng.CoefficientFunction:
+    """The components (6,) of what `strain_data` returned; about an axis rr, zz, the hoop's, rz.
+
+    By a product, so that functions of another mesh are looked for once at a point.
+    """
+    size = data.dim
+    parts = (float(k in places) for places in PLACES[size] for k in range(size))
+    return ng.CF(tuple(parts), dims=(6, size)) * data.Reshape((size,))
 
 
 def check_strains(
