@@ -48,6 +48,8 @@ PANEL_SHARE, MAX_PANELS = 0.4, 4
 # Pressures on this share of a zone are cut off if they exceed the rest by more than the factor.
 CUT_SHARE, CUT_RATIO = 0.1, 4.0
 
+MAX_INSIDE = 5  # lines of a legend in a panel, which would hide what more lines show
+
 FILM_DPI = 80
 FILM_HEADROOM = 1.05  # end of the scale of a film over its largest pressure
 
@@ -191,10 +193,10 @@ def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
     images = []
     for scene, title in zip(scenes, titles, strict=True):
         figure = Figure(layout="constrained")
-        [profile] = draw_scene(figure, scene, windows, limits, along)
+        profiles = draw_scene(figure, scene, windows, limits, along)
         xlim, ylim = np.transpose([low - margin, high + margin]).tolist()
         figure.axes[0].set(xlim=xlim, ylim=ylim)
-        if top > 0:
+        for profile in profiles if top > 0 else ():
             profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), top)
         figure.suptitle(title)
         canvas = FigureCanvasAgg(figure)
@@ -303,21 +305,25 @@ def draw_scene(
     """Draw a scene with close-ups, colour scale and pressure; returns the axes of the pressure.
 
     Bodies are on the left, close-ups in the middle, two in a column, and pressures on the right, a
-    panel for each of the intervals `parts` (2,) of the contact lines, chosen when left out.
+    panel for each of the intervals `parts` (2,) of the contact lines, chosen when left out; none
+    without contact points.
     """
     parts, style = parts or _shown_parts(scene.solution), scene.style
+    parts = parts if len(scene.solution.points) else []
     width, height = np.ptp(scene.moved, axis=0)
     tall = 1 if len(windows) < 2 else 2
     columns = -(-len(windows) // tall)
     ratios = [float(np.clip(width / height, 0.6, 2)), *[1.0 / tall] * columns]
-    ratios.append(1.2 if len(parts) == 1 else 0.8 * len(parts))
+    ratios += [1.2 if len(parts) == 1 else 0.8 * len(parts)] * bool(parts)
     figure.set_size_inches(2 + HEIGHT * 0.9 * sum(ratios), HEIGHT)
     figure.set_layout_engine("constrained", w_pad=PANEL_PAD)
-    grid = figure.add_gridspec(tall, columns + 2, width_ratios=ratios)
+    grid = figure.add_gridspec(tall, len(ratios), width_ratios=ratios)
     bodies = figure.add_subplot(grid[:, 0])
     close = [figure.add_subplot(grid[k % tall, 1 + k // tall]) for k in range(len(windows))]
-    beside = grid[:, -1].subgridspec(1, len(parts), wspace=0.05)
-    pressures = list(beside.subplots(sharey=True, squeeze=False)[0])
+    pressures: list[Axes] = []
+    if parts:
+        beside = grid[:, -1].subgridspec(1, len(parts), wspace=0.05)
+        pressures = list(beside.subplots(sharey=True, squeeze=False)[0])
     shading, *_ = [_draw_bodies(axes, scene, limits) for axes in (bodies, *close)]
     space = " " if width / height > 0.9 else "\n"
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
@@ -326,7 +332,8 @@ def draw_scene(
     ends = float(scene.values.min()) / unit, float(scene.values.max()) / unit
     scale = Scale(style.title(label, kind), ends, (limits[0] / unit, limits[1] / unit))
     colour_bar(figure, shading, [bodies, *close], scale)
-    _draw_pressures(pressures, scene.solution, style, parts)
+    if parts:
+        _draw_pressures(pressures, scene.solution, style, parts)
     return pressures
 
 
@@ -461,14 +468,17 @@ def _draw_pressures(
     first, last = several[0], several[-1]
     if top is not None:
         first.set_ylim(-0.03 * top / stress, top / stress)
-        text = f"↑ largest {solution.pressure.max() / stress:.3g}"
-        first.annotate(text, (0.5, 0.98), xycoords="axes fraction", ha="center", va="top")
+        largest = f"{first.get_ylabel()}, largest {solution.pressure.max() / stress:.3g}"
+        first.set_ylabel(largest)
     for axes in several[1:]:
         axes.set(ylabel="", title="")
     if len(solution.problem.contact) > 1 or style.profile or not solution.active.all():
         # Above the last of several panels, where it covers no points.
-        above = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.3}
-        last.legend(**above, fontsize="small", ncols=2) if last is not first else last.legend()
+        above = {"loc": "lower right", "borderaxespad": 0.3, "fontsize": "small", "ncols": 2}
+        beside = {"loc": "upper left", "fontsize": "small"}
+        outside = beside if len(last.get_legend_handles_labels()[0]) > MAX_INSIDE else above
+        covers = outside is above and last is first
+        last.legend(**({} if covers else outside | {"bbox_to_anchor": (1, 1)}))
 
 
 def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> None:

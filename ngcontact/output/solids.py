@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FRONT, UP = np.array([-0.45, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])  # to the viewer, upwards
-# Components of the view on a cut: upwards, and along the normals of the other cuts.
+# To the viewer, a little from above, so that no axis lies across; upwards.
+FRONT, UP = np.array([-0.45, -1.0, 0.05]), np.array([0.0, 0.0, 1.0])
+# Components of the view on a cut: upwards, or to the front where a cut looks up or down, and along
+# the normals of the other cuts.
 TILT, TURN = 0.35, 0.45
 # Cosine between the force and the normal of a plane of symmetry, up to which it cuts the zone; also
 # the length of a mean of unit normals, below which they cancel.
@@ -126,9 +128,17 @@ def _zone(solution: Solved, pair: int) -> Zone:
     second = np.cross(d, first)
     frame = np.array([first, second * np.copysign(1.0, second @ other), np.zeros(3)])
     frame[:2] /= np.linalg.norm(frame[:2], axis=1)[:, None]
-    frame[2] = np.cross(*frame[:2])
+    frame[2], surface = np.cross(*frame[:2]), surface.looking(d)
+    corners = surface.points[surface.nodes[:, :3]]
+    centre = corners.mean(axis=1)
+    radius = np.linalg.norm((corners - centre[:, None]) @ frame[:2].T, axis=2).max(axis=1)
+    beside = np.linalg.norm((centre - middle) @ frame[:2].T, axis=1) / radius
+    if beside.min() > 1:  # in the air between two zones
+        middle = centre[beside.argmin()]
     half = float(np.linalg.norm(place[touches] - middle, axis=1).max())
-    cuts = cuts or [Cut(middle, axis * np.sign(axis @ FRONT), False) for axis in frame[1::-1]]
+    cuts = cuts or [
+        Cut(middle, axis * np.copysign(1.0, axis @ FRONT), False) for axis in frame[1::-1]
+    ]
     pressure = surface.pressure(solution)
     return Zone(surface, pressure, middle, max(half, LEAST_SIZE * size), frame, cuts)
 
@@ -180,15 +190,15 @@ def _draw_bodies(
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
     (grid, lines, scale), shown = _grid(solution, style), style.shown(solution)
-    edges = pyvista.PolyData(grid.points, lines=sized(lines))
+    edges, ends = pyvista.PolyData(grid.points, lines=sized(lines)), grid.get_data_range("shown")
     normals = [cut.normal for cut in zone.cuts] if zone else [FRONT]
     if zone and not zone.cuts[0].symmetry:
         grid, edges = (
             x.clip(normal=zone.cuts[0].normal, origin=zone.middle) for x in (grid, edges)
         )
     eye = normals[0] + TURN * sum(normals[1:], np.zeros(3))
-    if np.abs(np.array(normals) @ UP).max() < VERTICAL_COSINE:
-        eye = eye + TILT * UP
+    upright = np.abs(np.array(normals) @ UP).max() < VERTICAL_COSINE
+    eye = eye + TILT * (UP if upright else FRONT)
     eye = eye / np.linalg.norm(eye)
     right = np.cross(UP, eye) / np.linalg.norm(np.cross(UP, eye))
     frame = np.array([right, np.cross(eye, right), eye])
@@ -197,6 +207,7 @@ def _draw_bodies(
     filtered.SetNonlinearSubdivisionLevel(SUBDIVISIONS)
     filtered.Update()
     surface = pyvista.wrap(filtered.GetOutput()).triangulate()
+    surface["shown"] = np.clip(surface["shown"], *ends)  # between nodes polynomials overshoot
     values, triangles = np.asarray(surface["shown"]), surface.faces.reshape(-1, 4)[:, 1:]
     seen = surface.points @ frame[:2].T
     windows, near = [(seen.min(axis=0), seen.max(axis=0))], []
@@ -311,11 +322,13 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         along *= np.sign(along[np.argmax(np.abs(along))]) / np.linalg.norm(along)
         # A plane that bounds the surface cuts it just inside.
         inside = STRAIGHT * data.length * cut.normal if cut.symmetry else 0.0
-        line = data.slice(normal=cut.normal, origin=cut.point - inside)
-        s = np.asarray(line.points @ along)
+        line = data.slice(normal=cut.normal, origin=cut.point - inside).connectivity()
+        s, piece = np.asarray(line.points @ along), line.point_data["RegionId"]
         order, half = np.argsort(s), (1 + ZONE_MARGIN) * zone.half
         names.append(_name(along, f"cut {k + 1}"))
-        axes.plot(s[order] / length, line["pressure"][order], color=COLOURS[k], label=names[-1])
+        apart = 1 + np.flatnonzero(np.diff(piece[order]))  # a line ends where the surface does
+        drawn = (np.insert(x[order], apart, np.nan) for x in (s / length, line["pressure"]))
+        axes.plot(*drawn, color=COLOURS[k], label=names[-1])
         ends += list(np.clip(zone.middle @ along + np.array([-half, half]), s.min(), s.max()))
     part = np.array([min(ends), max(ends)])
     draw_profiles(axes, style, part)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,16 @@ class ContactSurface:
     def triangles(self) -> Index:
         """Nodes (t, 3) of small triangles, order^2 of them to each facet."""
         return np.asarray(self.nodes[:, triangle.parts(self.trace.order)].reshape(-1, 3))
+
+    def looking(self, direction: Array) -> ContactSurface:
+        """The part whose facets look along `direction` (3,): none lies behind another."""
+        middle = np.tile(triangle.CENTRE, (len(self.facets), 1))
+        ahead = self.trace.normal(self.facets, middle) @ direction > 0
+        used, nodes = np.unique(self.nodes[ahead], return_inverse=True)
+        nodes, facets = nodes.reshape(-1, self.nodes.shape[1]), self.facets[ahead]
+        return replace(
+            self, facets=facets, nodes=nodes, points=self.points[used], row=self.row[used]
+        )
 
     def values(self, values: Array) -> Array:
         """Values (n,) at the nodes, of `values` (m,) at contact points.

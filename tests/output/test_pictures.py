@@ -1,5 +1,6 @@
 """Pictures of a solution: panels, fields, units, curves, mirror images, labels seen whole."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import matplotlib
@@ -10,7 +11,7 @@ from matplotlib import pyplot
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.output import plot_solution
+from ngcontact.output import plot_solution, write_film
 from ngcontact.output.pictures import close_ups, colour_and_mark, colour_range, cut_pressure
 from ngcontact.output.scene import Style, contact_lines, picture
 from tests.output.stubs import stub, two_bodies
@@ -73,7 +74,7 @@ def test_singular_ends_are_cut_and_marked(tmp_path, solution):
     figure = plot_solution(solution, tmp_path / "a.png", units={"stress": ("kPa", 10.0)})
     [axes] = [a for a in figure.axes if a.get_title() == "contact pressure"]
     assert axes.get_ylim()[1] == pytest.approx(top / 10)
-    assert any("largest 100" in text.get_text() for text in axes.texts)
+    assert axes.get_ylabel() == "contact pressure [kPa], largest 100"
 
 
 @pytest.mark.parametrize(
@@ -269,3 +270,18 @@ def test_small_zones_beside_large_ones_are_shown():
 
 def test_pairs_differ_by_colour_or_mark():
     assert len({colour_and_mark(pair) for pair in range(49)}) == 49
+
+
+def test_without_contact_there_is_no_pressure_to_draw(tmp_path, pressed_half):
+    problem = replace(pressed_half.problem, contact=[])
+    figure = plot_solution(solve(problem, maxh=0.4), tmp_path / "a.png")
+    assert not [axes for axes in figure.axes if axes.get_title() == "contact pressure"]
+    assert write_film(tmp_path / "a.gif", [solve(problem, maxh=0.4)]).exists()
+
+
+def test_a_long_legend_stands_beside_the_pressures(tmp_path, solution):
+    solution.problem.contact = [Contact(f"arc{k}", "block_top") for k in range(6)]
+    solution.pair[:] = np.arange(len(solution.pair)) // 34
+    figure = plot_solution(solution, tmp_path / "a.png")
+    [axes] = [axes for axes in figure.axes if axes.get_title() == "contact pressure"]
+    assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1

@@ -3,10 +3,12 @@
 from dataclasses import replace
 
 import matplotlib.image
+import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.occ import Box, Compound, OCCGeometry, Pnt, Sphere, X, Z
 
-from ngcontact import Contact, solve
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solids, write_film
 from ngcontact.output.surface import contact_surface
 from tests.output.test_solids import PRESSURE, pressed_ball, pressed_cube
@@ -108,3 +110,77 @@ def test_every_profile_is_drawn_and_the_pair_is_named(tmp_path):
     assert len({line.get_linestyle() for line in drawn}) == 4
     title = panel(figure, "pressure on").get_title()
     assert title == "pressure on cube_bottom\npair 1, of 2 that of the largest force"
+
+
+def boxes(**corners):
+    """Solids, each made of boxes given by opposite corners; faces are named as "slab_left"."""
+    solids = []
+    for name, places in corners.items():
+        for low, high in places:
+            body = Box(low, high)
+            body.solids.name, body.faces.name = name, f"{name}_side"
+            body.faces.Min(X).name, body.faces.Max(X).name = f"{name}_left", f"{name}_right"
+            body.faces.Min(Z).name, body.faces.Max(Z).name = f"{name}_bottom", f"{name}_top"
+            solids.append(body)
+    return OCCGeometry(Compound(solids))
+
+
+@pytest.mark.parametrize("sliding", [(), ".*_bottom"])
+def test_upright_faces_in_contact_are_seen_from_above(sliding, tmp_path):
+    """Cut by a plane z = const, of symmetry or not, to which upwards is normal."""
+    problem = Problem(
+        geometry=boxes(wall=[((-1, 0, 0), (0, 1, 1))], slab=[((0, 0, 0), (1, 1, 1))]),
+        materials={"wall|slab": Elastic(E=1.0, nu=0.0)},
+        displacement={"wall_left": (0, 0, 0)},
+        sliding=sliding,
+        traction={"slab_right": PRESSURE},
+        contact=[Contact("slab_left", "wall_right")],
+    )
+    solution = solve(problem, maxh=0.7, order=2)
+    figure = plot_solids(solution, tmp_path / "a.png")
+    for line in panel(figure, "contact pressure").lines[:-1]:
+        np.testing.assert_allclose(line.get_ydata(), PRESSURE, rtol=1e-9)
+    (image,) = panel(figure, "deformed").images
+    assert 0.05 < (image.get_array() == 255).all(axis=2).mean() < 0.7  # bodies and background
+
+
+def test_a_zone_of_two_parts_is_cut_in_one_and_not_joined(tmp_path):
+    """A plate on two columns: the middle of their tops is in the air."""
+    columns = [((-1, 0, -1), (-0.5, 1, 0)), ((0.5, 0, -1), (1, 1, 0))]
+    problem = Problem(
+        geometry=boxes(column=columns, plate=[((-1, 0, 0), (1, 1, 1))]),
+        materials={"column": Elastic(E=1.0, nu=0.3), "plate": Elastic(E=1e3, nu=0.3)},
+        displacement={"column_bottom": (0, 0, 0)},
+        traction={"plate_top": PRESSURE},
+        contact=[Contact("column_top", "plate_bottom")],
+    )
+    figure = plot_solids(solve(problem, maxh=0.7, order=1), tmp_path / "a.png")
+    x, y, _ = panel(figure, "contact pressure").lines
+    assert np.isnan(x.get_ydata()).sum() == 1
+    assert not np.isnan(y.get_ydata()).any()
+    assert np.nanmin(x.get_ydata()) > 0  # also on the other column
+
+
+def test_of_a_closed_surface_the_front_is_drawn(tmp_path):
+    """A ball that swells in a rigid shell: pressures of its back lie behind those of its front."""
+    ball = Sphere(Pnt(0, 0, 0), 1.0)
+    ball.solids.name, ball.faces.name = "ball", "skin"
+    problem = Problem(
+        geometry=OCCGeometry(ball),
+        materials={"ball": Elastic(E=1.0, nu=0.3)},
+        strain={"ball": 1e-3},
+        contact=[Contact("skin", gap=0.0)],
+    )
+    figure = plot_solids(solve(problem, maxh=0.7, order=1), tmp_path / "a.png")
+    (drawn, *_) = panel(figure, "pressure on skin").collections
+    a, b, c = np.array([path.vertices[:3] for path in drawn.get_paths()]).transpose(1, 2, 0)
+    area = np.abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).sum() / 2
+    assert area == pytest.approx(np.pi, rel=0.3)  # of its shadow: that of a coarse polyhedron
+
+
+def test_what_is_positive_has_no_negative_colours(tmp_path):
+    """A step, between whose nodal values 0, 0, 1 the polynomials of curved cells have -1/8."""
+    step = ng.IfPos(ng.x - 0.1, 1.0, 0.0)
+    figure = plot_solids(pressed_ball(), tmp_path / "a.png", field=step)
+    bars = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    assert bars[0].get_ylim() == (0, 1)
