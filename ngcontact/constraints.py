@@ -46,6 +46,11 @@ class Conditions:
     direction: Array  # (k, d) unit vectors a
     value: Array  # (k,) prescribed displacements along them, in units of length
 
+    def directed_as(self, other: Conditions) -> bool:
+        """Whether the others prescribe the same directions at the same nodes."""
+        same = np.array_equal(self.node, other.node)
+        return same and np.array_equal(self.direction, other.direction)
+
 
 @dataclass(frozen=True, eq=False)
 class Entries:
@@ -311,6 +316,32 @@ def _without_links(C: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
     return known + place @ sp.csr_array(np.linalg.inv(block)) @ (right - C @ known)[linked]
 
 
+def _in_frames(rows: Rows, supported: _Supported) -> tuple[Entries, Entries]:
+    """Entries of `rows` in the frames of the nodes, and what supports leave free of them."""
+    e, fixed, frame = rows.entries, supported.fixed, supported.frames.columns
+    e = replace(e, coefficient=np.einsum("ki,kij->kj", e.coefficient, frame[e.node]))
+    return e, replace(e, coefficient=np.where(fixed[e.node], 0.0, e.coefficient))
+
+
+def held_rows(conditions: Conditions, rows: Rows, length: float) -> Mask:
+    """Rows (m,) at nodes which `conditions` leave no displacement along their directions.
+
+    Raises
+    ------
+    ValueError
+        Prescribed displacements on both sides violate a row; an overlap as drawn is none here.
+    """
+    n, m = rows.coupling.shape[1], len(rows.node)
+    supported = _supported(n, conditions)
+    e, free = _in_frames(rows, supported)
+    size = np.linalg.norm(free.coefficient, axis=1)
+    own = e.node == rows.node[e.row]
+    whole = (np.bincount(e.row, size > MIN_SINE, m) == 0) & (np.diff(rows.coupling.indptr) > 0)
+    g = np.where(rows.equality, rows.g, np.maximum(rows.g, 0.0))
+    _check_prescribed(replace(rows, g=g), e, supported, np.flatnonzero(whole), length)
+    return np.bincount(e.row[own], size[own], m) <= MIN_PIVOT
+
+
 def change_of_basis(
     conditions: Conditions,
     rows: Rows,
@@ -329,9 +360,8 @@ def change_of_basis(
     """
     n, d = rows.coupling.shape[1], rows.direction.shape[1]
     supported = _supported(n, conditions)
-    frame, fixed, e = supported.frames.columns, supported.fixed, rows.entries
-    e = replace(e, coefficient=np.einsum("ki,kij->kj", e.coefficient, frame[e.node]))
-    free = replace(e, coefficient=np.where(fixed[e.node], 0.0, e.coefficient))
+    frame, fixed = supported.frames.columns, supported.fixed
+    e, free = _in_frames(rows, supported)
     taken = _Frames(np.tile(np.eye(d), (n, 1, 1)), supported.frames.used.copy())
     preferred = _preferred(rows, np.ones(n) if stiffness is None else stiffness)
     host, slot, local = _hosts(preferred, free, taken)

@@ -18,11 +18,12 @@ phi, with more unknowns in a row, but the node's alone on curves: rotations alon
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, from_triplets, rows_of
@@ -53,6 +54,10 @@ from .projection import MATCHING_DISTANCE
 
 MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which hats take its place
 SMALLEST_SHARE = 1e-8  # of a point's weight on its whole segments, below which it carries no row
+LENGTH_STEP = 1e-6  # of the longest, in which lengths of edges are counted: round-off is no tie
+
+# Which points (m,) of a line supports leave no displacement along their direction.
+Held = Callable[[ContactLine], Mask]
 
 
 def _dual_basis(
@@ -129,35 +134,71 @@ def _integrals(
     return weight, np.einsum("kij,kj->ki", change, gap), coupling
 
 
+def _passed_on(line: ContactLine, rows: Index, held: Mask) -> Index:
+    """The point (k, q) whose row takes what weighs at each of the points `rows` (k, q), or -1.
+
+    That is the point itself, or, where it is `held`, the nearest that is not, along edges and
+    nodes of the facets; a held one itself where none is. No point, -1, is not `held` (m + 1,).
+    """
+    m = len(held) - 1
+    to, free = np.append(np.arange(m), -1), np.unique(rows[(rows >= 0) & ~held[rows]])
+    if not free.size:
+        return rows
+    pair = np.stack(np.broadcast_arrays(line.rows[:, :, None], line.rows[:, None]), axis=-1)
+    pair = np.unique(pair[(pair >= 0).all(axis=-1) & (pair[..., 0] < pair[..., 1])], axis=0)
+    length = np.linalg.norm(np.diff(line.position[pair], axis=1)[:, 0], axis=1)
+    length = np.ceil(length / (LENGTH_STEP * length.max()) - 0.5)
+    graph = from_triplets(length, pair[:, 0], pair[:, 1], (m, m))
+    _, _, nearest = dijkstra(graph, False, free, True, min_only=True)
+    to[:-1] = np.where(held[:-1] & (nearest >= 0), nearest, to[:-1])
+    return np.asarray(to[rows])
+
+
 def with_dual_rows(
-    trace: BoundaryTrace, line: ContactLine, facing: Mask
+    trace: BoundaryTrace, line: ContactLine, facing: Mask, held: Held | None = None
 ) -> tuple[ContactLine, Mask]:
     """The line with dual rows where nodes do not face nodes, and which points (m,) carry rows.
 
     The `line` has points at all nodes of the secondary, of which `facing` (m,) face the primary. A
     point on segments of both kinds takes the mean of both rows, by their weights; one whose
     segments all match keeps the row at its node to the last bit.
+
+    Rows of nodes `held` along their directions would have to be unknowns of the primary, of which
+    a coarser one has too few. The psi of these nodes are added to those of nodes beside, so that
+    the sum of all stays 1, as at the ends of interfaces in mortar methods.
     """
     if len(line.facing) == 0:
         return line, facing
     contact, m = line.contact, len(facing)
     matched = (opposite_segments(trace, line, facing) >= 0) & (contact.rows != "dual")
-    chosen = np.flatnonzero(~matched)
-    if len(chosen) == 0:
+    if matched.all():
         return line, facing
+    fixed = np.zeros(m + 1, dtype=bool)
+    if held is not None:
+        fixed[:-1] = held(line)
+        matched &= ~fixed[line.rows].any(axis=1)  # else nodal rows alone would be left there
+    chosen = np.flatnonzero(~matched)
     segments, rows = line.segments[chosen], line.rows[chosen]
     pieces = divided(trace, contact, segments, line.facing, distances(trace, line)[chosen])
     D, gaps, coupling = _integrals(trace, contact, segments, pieces)
-    here = (rows >= 0) & (D > 0)
-    point = rows[here]
+    here, own = (rows >= 0) & (D > 0), rows
+    if fixed.any():
+        rows = np.where(here, _passed_on(line, np.where(here, rows, -1), fixed), rows)
+        slot = np.flatnonzero(rows != own)
+        at = np.concatenate([line.node[x.ravel()[slot]] for x in (rows, own)])
+        values = np.outer([1.0, -1.0], D.ravel()[slot]).ravel()
+        coupling = coupling + from_triplets(values, np.tile(slot, 2), at, coupling.shape)
+    point, points = rows[here], line.rows.copy()
+    points[chosen] = rows
     cosine = np.ones(len(point))
     if contact.direction is None:  # of normals, where two sides share a point
         normal = trace.exact_normal(*trace.at_nodes(segments))[here.ravel()]
         cosine = (normal * line.direction[point]).sum(axis=1)
+    across = np.where((rows != own)[here], 1.0, cosine)
     faces, covered = line.faces.copy(), line.covered.copy()
     faces[chosen] = (pieces.covered(len(chosen)) > WHOLE_SHARE) & here.all(axis=1)
     weights = np.where(here, D, 0.0)
-    weights[here] *= cosine
+    weights[here] *= across
     covered[chosen] = weights
     nodal, dual, gap, whole = np.zeros((4, m))
     np.add.at(nodal, line.rows[matched], line.shares[matched])
@@ -167,10 +208,11 @@ def with_dual_rows(
     at_nodes = dual == 0
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
-    scale, shape = cosine / weight[point], (m, coupling.shape[0])
+    scale, shape = across / weight[point], (m, coupling.shape[0])
     means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
     line = replace(
         line,
+        rows=points,
         gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
         # By matched segments, without one of which the ends alone face, over a slot at order 1.
         weight=np.where(at_nodes, np.where(nodal > 0, nodal, line.weight), nodal + dual),
@@ -185,10 +227,13 @@ def with_dual_rows(
     return line, carries & (line.weight > SMALLEST_SHARE * whole)
 
 
-def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = None) -> ContactLine:
+def contact_line(
+    trace: BoundaryTrace, contact: Contact, taken: Index | None = None, held: Held | None = None
+) -> ContactLine:
     """Contact points of one pair: at nodes where nodes face nodes, with dual rows elsewhere.
 
-    Segments `taken` (j,) of its secondary belong to other pairs.
+    Segments `taken` (j,) of its secondary belong to other pairs. Supports leave the points that are
+    `held` no displacement along their direction.
 
     Raises
     ------
@@ -198,7 +243,7 @@ def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = N
     contact = with_roles(trace, contact)
     line, facing = nodal_line(trace, contact, taken)
     if contact.primary is not None and contact.rows != "nodal":
-        line, facing = with_dual_rows(trace, line, facing)
+        line, facing = with_dual_rows(trace, line, facing, held)
     carries = facing & (line.weight > 0)
     if len(line.segments) and not carries.any():
         raise ValueError(no_point_faces(contact))

@@ -36,12 +36,14 @@ class SignedDistance:
 def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) -> SignedDistance:
     """The distance from the end of a pair's contact, positive inside it."""
     line, m, active = state.line, len(state.gap), state.active
-    name = np.where(line.rows >= 0, line.rows, m + trace.nodes[line.segments])
+    nodes = trace.nodes[line.segments]
+    own = line.rows_at(nodes)
+    name = np.where(own >= 0, own, m + nodes)
     size = trace.sizes(line.segments)
 
     def at_nodes(values: Array) -> Array:
         known = np.append(values, np.nan)[line.rows]
-        return with_vertices(known, name >= m, name, size, within=True)
+        return with_vertices(known, line.rows < 0, name, size, within=True)
 
     closed = np.where(active, state.pressure**2, 0.0)
     opened = np.where(active, 0.0, np.maximum(state.gap, 0.0) ** (2 / 3))

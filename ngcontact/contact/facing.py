@@ -248,7 +248,7 @@ def opposite_segments(
     `facing` (m,) are the points that face the primary. Vertices without a point, as on Gamma_u,
     face those at the same place, on `some` (k,) of the segments.
     """
-    corners = line.rows[:, trace.corners]
+    corners = line.rows_at(trace.nodes[line.segments])[:, trace.corners]
     vertices = np.append(faced_vertices(trace, line, facing), -1)[corners]
     sides, x = trace.nodes[line.facing][:, trace.corners], trace.arrays.vertices
     alone = (corners < 0) & (some is not None and some[:, None])

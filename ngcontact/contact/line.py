@@ -27,7 +27,9 @@ class ContactLine:
     contact: Contact
     segments: Index  # (k,) segments of the secondary boundary
     facing: Index  # (q,) segments of the primary boundary
-    rows: Index  # (k, q) contact point at each of the q nodes of each segment, -1 where none is
+    # (k, q) contact point at each of the q nodes of each segment, -1 where none is; at nodes of
+    # solids that supports hold the one beside that stands for them
+    rows: Index
     faces: Mask  # (k,) segments that face the primary with all their nodes
     node: Index  # (m,) node of the secondary
     position: Array  # (m, d)
@@ -47,6 +49,10 @@ class ContactLine:
     def dim(self) -> int:
         """Dimension of the bodies."""
         return int(self.position.shape[1])
+
+    def rows_at(self, nodes: Index) -> Index:
+        """Contact points (k, q) that lie at the `nodes` (k, q) of the segments; -1 where none."""
+        return np.where(np.append(self.node, -1)[self.rows] == nodes, self.rows, -1)
 
     def covered_shares(self, on_parts: Array, everywhere: Array) -> Array:
         """Integrals (k,) of functions over the parts that face, over those on whole facets.

@@ -230,13 +230,14 @@ class AdmissibleSet:
     """K_h of HH81 (2.3), (2.5), (2.10)."""
 
     lines: list[ContactLine]  # the contact pairs with the points that carry rows
-    conditions: Conditions  # Gamma_u and Gamma_0 at nodes
     rows: Rows  # those of all pairs in order
     basis: BasisTransformation  # unknowns in which rows and prescribed values are single unknowns
 
 
-def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine]) -> AdmissibleSet:
-    """K_h for the contact points `found` of each pair.
+def admissible_set(
+    space: Space, conditions: Conditions, found: Sequence[ContactLine]
+) -> AdmissibleSet:
+    """K_h for the `conditions` of supports and the contact points `found` of each pair.
 
     Raises
     ------
@@ -244,11 +245,10 @@ def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine])
         Prescribed displacements that violate a contact row.
     """
     trace = space.trace
-    conditions = support_conditions(problem, trace)  # (3.6), (3.8)
     lines, rows = merged(list(found), contact_rows(list(found), trace))  # (2.3), (2.5), (2.10)
     length = float(np.abs(trace.curve).max())
     stiffness = space.stiffness() if rows.coupling.nnz else None  # else all rows have one host
     basis = change_of_basis(conditions, rows, length, stiffness)
     if space.inner.any():  # of these nothing is left in the matrix
         basis = replace(basis, fixed=basis.fixed | space.inner)
-    return AdmissibleSet(kept_lines(lines, basis.kept), conditions, rows.select(basis.kept), basis)
+    return AdmissibleSet(kept_lines(lines, basis.kept), rows.select(basis.kept), basis)

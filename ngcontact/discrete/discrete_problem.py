@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Mask, from_triplets
-from ..constraints import BasisTransformation, Conditions, Rows
+from ..constraints import BasisTransformation, Conditions, Rows, held_rows
 from ..contact import ContactLine, ContactState, by_line, contact_line, for_partial_cover
 from ..errors import ConvergenceError, NoEquilibriumError
 from ..fem import (
@@ -48,7 +48,13 @@ from ..qp import (
     minimise,
     no_null_space,
 )
-from .admissible_set import AdmissibleSet, admissible_set, conditioned_segments
+from .admissible_set import (
+    AdmissibleSet,
+    admissible_set,
+    conditioned_segments,
+    contact_rows,
+    support_conditions,
+)
 from .equilibrium import Rigid, equilibrium
 
 TOUCHING_GAP = 1e-12  # gap, relative to the zone, up to which points start active
@@ -212,13 +218,20 @@ def same_basis(one: BasisTransformation, other: BasisTransformation) -> bool:
 
 
 def contact_lines(
-    problem: Problem, trace: BoundaryTrace, known: Sequence[ContactLine]
+    problem: Problem,
+    trace: BoundaryTrace,
+    conditions: Conditions,
+    known: Sequence[ContactLine],
 ) -> list[ContactLine]:
-    """The line of each pair, a known one where it is the same.
+    """The line of each pair with the `conditions` at its nodes, a known one where it is the same.
 
     What an earlier pair of the same direction and gap covers is left to that one where both know
     the facing segments.
     """
+
+    def held(line: ContactLine) -> Mask:
+        return held_rows(conditions, contact_rows([line], trace), np.abs(trace.curve).max())
+
     alike, lines = attrgetter("direction", "bilateral", "rows", "roles"), list[ContactLine]()
     for number, contact in enumerate(problem.contact):
         taken, facing = [np.zeros(0, dtype=np.intp)], trace.segments(contact.primary)
@@ -240,9 +253,11 @@ def contact_lines(
             and contact.gap is None
         )
         found = None if own.size else next(same, None)
-        lines.append(
-            contact_line(trace, contact, own) if found is None else replace(found, searches=0)
-        )
+        if found is None:
+            in_space = trace.model.dim == 3  # of lines only two ends can be held
+            lines.append(contact_line(trace, contact, own, held if in_space else None))
+        else:
+            lines.append(replace(found, searches=0))
     return lines
 
 
@@ -271,8 +286,10 @@ def discretise(
     nodal = conditioned_segments(problem, trace)
     if previous is not None and not same_mesh(trace, previous.space):
         previous = None  # its mesh has been changed in place
-    known = [] if previous is None else previous.found
-    found = contact_lines(problem, trace, known)  # Gamma_K, first: it may be refused
+    conditions, known = support_conditions(problem, trace), list[ContactLine]()  # (3.6), (3.8)
+    if previous is not None and conditions.directed_as(previous.conditions):
+        known = previous.found
+    found = contact_lines(problem, trace, conditions, known)  # Gamma_K, first: it may be refused
     if previous is not None and not same_stiffness(problem, previous.problem):
         previous = None
     if previous is None:
@@ -287,9 +304,9 @@ def discretise(
             f=load_vector(problem, V, LOAD_BONUS),
             initial=initial_load(problem, V, trace),
         )
-    admissible = admissible_set(problem, space, found)
+    admissible = admissible_set(space, conditions, found)
     basis, rows = admissible.basis, admissible.rows
-    rigid, f = equilibrium(problem, space, admissible.conditions, rows, basis)  # Remark 3.7
+    rigid, f = equilibrium(problem, space, conditions, rows, basis)  # Remark 3.7
     space = replace(space, f=f)
     T = space.basis @ basis.T
     same_unknowns = previous is not None and same_basis(basis, previous.basis)
@@ -307,7 +324,7 @@ def discretise(
         space=space,
         found=found,
         lines=admissible.lines,
-        conditions=admissible.conditions,
+        conditions=conditions,
         rows=rows,
         basis=basis,
         program=program,
