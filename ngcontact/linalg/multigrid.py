@@ -18,9 +18,12 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..arrays import Array, Mask
 from .coarse_spaces import Coarsening
-from .sparse import handed_over, inverse_of, shared
+from .sparse import handed_over, inverse_of, reversed_order, shared
 
 TRIAL_CYCLES = 25  # V-cycles after which is judged whether the target will be reached
+# Entries of a row from which the reverse sweep runs on a copy of the matrix: against the stream of
+# memory it takes 2.5 times the forward one with the 87 of solids of order 2, 1.2 times with 14.
+LONG_ROWS = 40
 DEGREE = 4  # of the polynomial: of 2 to 4 the fastest in whole solves of a million unknowns
 EIGENVALUE_ERROR = 0.1  # relative, of the largest eigenvalue
 LANCZOS_STEPS = 6  # before it is decided whether that is met: it is
@@ -39,14 +42,21 @@ class GaussSeidel:
     """A sweep over all `free` (n,) unknowns of a semidefinite `matrix`, and the reverse one."""
 
     sweeps: ng.BaseSmoother
+    turned: ng.BaseMatrix | None = None  # the matrix in reverse order, where its rows are long
+    reverse: ng.BaseSmoother  # the forward sweep of that one
 
     def __init__(self, matrix: ng.BaseMatrix, free: Mask) -> None:
         self.matrix = matrix
+        if shared(matrix).nnz > LONG_ROWS * matrix.height:
+            self.turned = reversed_order(matrix)
+            self.right, self.solution = matrix.CreateColVector(), matrix.CreateColVector()
         self.hold(free)
 
     def hold(self, free: Mask) -> None:
         """Let `free` (n,) be the unknowns."""
         self.sweeps = self.matrix.CreateSmoother(ng.BitArray(free))
+        if self.turned:
+            self.reverse = self.turned.CreateSmoother(ng.BitArray(free[::-1].copy()))
 
     def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
         """Set `solution` (n,), starting from zero."""
@@ -55,7 +65,13 @@ class GaussSeidel:
 
     def after(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
         """Improve `solution` (n,)."""
-        self.sweeps.SmoothBack(solution, right)
+        if not self.turned:
+            self.sweeps.SmoothBack(solution, right)
+            return
+        self.right.FV().NumPy()[:] = right.FV().NumPy()[::-1]
+        self.solution.FV().NumPy()[:] = solution.FV().NumPy()[::-1]
+        self.reverse.Smooth(self.solution, self.right)
+        solution.FV().NumPy()[:] = self.solution.FV().NumPy()[::-1]
 
 
 class Chebyshev:

@@ -35,6 +35,15 @@ def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
     return sp.csr_array((values, columns, starts), (matrix.height, matrix.width))
 
 
+def reversed_order(matrix: ng.BaseMatrix) -> ng.BaseMatrix:
+    """A copy of a matrix (n, n) in which rows and columns are in reverse order."""
+    there = matrix.CreateMatrix()
+    values, columns, starts = (np.asarray(x) for x in there.CSR())
+    columns[:] = matrix.height - 1 - columns[::-1].copy()
+    values[:], starts[:] = values[::-1].copy(), len(values) - starts[::-1].copy()
+    return there
+
+
 def _from_entries(row: Index, column: Index, values: Array, shape: tuple[int, int]) -> Any:
     """NGSolve's matrix (m, n), its `shape`, of `values` (k,) at `row` and `column` (k,), summed."""
     entries = []

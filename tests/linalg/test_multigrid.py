@@ -5,10 +5,12 @@ import logging
 import ngsolve as ng
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from ngcontact.linalg.iterative import IterativeSystems, Limits
 from ngcontact.linalg.multigrid import (
     DEGREE,
+    LONG_ROWS,
     SAFETY,
     Chebyshev,
     GaussSeidel,
@@ -72,6 +74,24 @@ def test_cycles_do_not_grow_with_the_mesh(name: str, smoother, order: int, most:
         counts.append(count)
     assert max(counts) <= most
     assert counts[-1] <= 1.25 * counts[-2] + 1  # measured 1.2; and a whole one
+
+
+@pytest.mark.parametrize("size", [LONG_ROWS // 2, 2 * LONG_ROWS])
+def test_the_sweep_after_is_the_reverse_one(size):
+    """Of few entries a row NGSolve's own, of many that of a copy in reverse order."""
+    rng = np.random.default_rng(size)
+    B = rng.normal(size=(size, size))
+    K, free = B @ B.T + size * np.eye(size), rng.random(size) < 0.8
+    matrix = handed_over(sp.csr_array(K))
+    smoother = GaussSeidel(matrix, free)
+    right, solution = matrix.CreateColVector(), matrix.CreateColVector()
+    b, x = right.FV().NumPy(), solution.FV().NumPy()
+    b[:], x[:] = rng.normal(size=(2, size))
+    exact = x.copy()
+    exact[free] += np.linalg.solve(np.triu(K[np.ix_(free, free)]), (b - K @ x)[free])
+    smoother.after(right, solution)
+    # Round-off of sums of `size` terms; the condition of the triangle is about 4.
+    np.testing.assert_allclose(x, exact, rtol=0, atol=1e-13 * size)
 
 
 def test_what_does_not_converge_is_said():
