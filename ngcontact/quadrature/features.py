@@ -35,7 +35,8 @@ WINDOWS = (3, 7, 15, 31, 63, 127, 255)  # samples, each of twice the last and on
 WINDOW_LOSS = 0.5  # of the change in a window, what is lost there of a feature
 # Of these, for features at ends of lines, where the end of a wave looks like one ...
 END_WINDOW = 31
-END_WINDOWS = 4  # ... but changes far more within so many windows
+END_WINDOWS = 6  # ... but goes on as a polynomial through so many windows,
+END_DEGREE = 3  # of such a degree
 # The same in bodies; laws are not integrated on parts of elements that follow them.
 IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47), "strain": (5, 11, 23, 47)}
 WINDOW_SAMPLES = 4  # samples, half of them on each side
@@ -245,6 +246,11 @@ class _Line:
         """Lengths from the start to all ends of segments."""
         return np.append(0.0, np.cumsum(self.view.sizes[self.segments]))
 
+    @property
+    def closed(self) -> bool:
+        """Whether it ends where it starts."""
+        return bool(np.ptp(self.places(self.ends[[0, -1]]), axis=0).max() < self.spacing / 2)
+
     def _at(self, t: Array) -> tuple[Index, Array]:
         """Segments and points on them at the lengths `t` (n,)."""
         k = np.searchsorted(self.ends, t, side="right") - 1
@@ -276,8 +282,10 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
     _, limit = _searched(kind, sampled)
     found = [NO_JUMPS]
     for line in lines:
-        components = np.ascontiguousarray(np.hstack([line.sampled, -line.sampled]).T)
-        for departure in _departures(components, limit):
+        components = np.hstack([line.sampled, -line.sampled]).T
+        around = len(line.t) // 2 if line.closed else 0
+        components = np.pad(components, ((0, 0), (around, around)), mode="wrap")
+        for departure in _departures(components, limit)[:, around : around + len(line.t)]:
             changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
             runs = np.flatnonzero(changes).reshape(-1, 2).tolist()
             if 0 < len(runs) <= FEATURES:  # more are roughness, which the estimate tells
@@ -322,11 +330,18 @@ def _departures(values: Array, limit: float) -> Array:
         for peaks, size, value in zip(some, now, values, strict=True):
             for back in (1, -1):  # runs that reach an end
                 n = int(np.argmin(np.append(peaks[::back], False)))
-                beside = np.ptp(value[::back][: END_WINDOWS * window])
-                if window > END_WINDOW or size[::back][:n].max(initial=0.0) <= WINDOW_LOSS * beside:
+                most = WINDOW_LOSS * size[::back][:n].max(initial=0.0)
+                if n and (window > END_WINDOW or _beyond(value[::back], n, window) <= most):
                     peaks[::back][:n] = False
         found = np.maximum(found, np.where(some, now, 0.0))
     return found
+
+
+def _beyond(value: Array, n: int, window: int) -> float:
+    """Largest distance of the first n samples from a polynomial through those of windows beside."""
+    beside = np.arange(n, min(END_WINDOWS * window, len(value)))
+    through = np.polynomial.Polynomial.fit(beside, value[beside], min(END_DEGREE, len(beside) - 1))
+    return float(np.abs(value[:n] - through(np.arange(n))).max())
 
 
 def _chains(view: SampledElements, segments: Index) -> list[tuple[Index, Mask]]:

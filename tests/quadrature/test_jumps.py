@@ -12,6 +12,7 @@ from drivers.reference.laws import fibres
 from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.fem import warn_of_jumps
+from ngcontact.geometries import rings
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import features_of, sample_data, unresolved
 from ngcontact.quadrature.cells import lattice
@@ -168,6 +169,8 @@ SMOOTH = [
     ng.IfPos(ng.x - 0.4, 1.0, 2.0),
     ng.cos(27 * ng.x + 2.52),  # turns shortly before an end ...
     ng.cos(29.9 * ng.x + 1.02),  # ... or shortly after
+    (ng.x - 0.015) ** 2,  # the same of parabolas
+    (ng.x - 0.032) ** 2,
 ]
 
 
@@ -175,6 +178,17 @@ SMOOTH = [
 @pytest.mark.parametrize("number", range(len(SMOOTH)))
 def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
     assert not len(found(given(kind, SMOOTH[number]), kind).places)
+
+
+@pytest.mark.parametrize("phase", np.linspace(0, 6, 7))
+def test_circles_have_no_ends(phase):
+    """As of an oval hole: where the samples began `adapt` saw a feature, and ran on."""
+    laws = {".*": Elastic(1.0, 0.3)}
+    gap = 1e-3 * (1 + ng.cos(2 * ng.atan2(ng.y, ng.x) - float(phase)))
+    for side, other in (("inner_contact", "outer_contact"), ("outer_contact", "inner_contact")):
+        held = {"hole": (1e-3, 0), "rim": (0, 0)}
+        pair = Contact(side, other, gap=gap)
+        assert not len(found(Problem(rings(), laws, held, contact=[pair]), "gap").places)
 
 
 @pytest.mark.parametrize("order", [1, 3])
