@@ -107,19 +107,27 @@ def _changed(matrix: ng.BaseMatrix, A: sp.csr_array, change: sp.csr_array) -> ng
     return total
 
 
+def _entries(K: sp.csr_array, rows: Index) -> tuple[Index, Index]:
+    """Numbers (k,) of the entries of `rows` of `K`, and their places, which rise, in any matrix."""
+    count = np.diff(K.indptr)[rows]
+    first = K.indptr[rows] - np.cumsum(count) + count
+    entries = np.arange(count.sum()) + np.repeat(first, count)
+    return entries, np.repeat(rows, count) * K.shape[1] + K.indices[entries]
+
+
 def _places(A: sp.csr_array, change: sp.csr_array) -> Index | None:
     """Numbers (k,) of the entries of `A` at those of its `change`, both (n, n).
 
-    None where `A` has no entry for one of them, as between two bodies.
+    None where `A` has no entry for one of them, as between two bodies: some rows tell most often.
     """
-    n, rows = A.shape[0], np.diff(change.indptr).nonzero()[0]
-    count = np.diff(A.indptr)[rows]
-    first = A.indptr[rows] - np.cumsum(count) + count
-    entries = np.arange(count.sum()) + np.repeat(first, count)
-    keys = np.repeat(rows, count) * n + A.indices[entries]  # rising, as columns are in each row
-    wanted = np.repeat(rows, np.diff(change.indptr)[rows]) * n + change.indices
-    found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    return entries[found] if np.array_equal(keys[found], wanted) else None
+    rows = np.diff(change.indptr).nonzero()[0]
+    for some in (rows[:: len(rows) // 16 + 1], rows):
+        entries, there = _entries(A, some)
+        _, wanted = _entries(change, some)
+        found = np.minimum(np.searchsorted(there, wanted), len(there) - 1)
+        if not np.array_equal(there[found], wanted):
+            return None
+    return entries[found]
 
 
 def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
