@@ -26,6 +26,7 @@ from ..arrays import Array, from_triplets
 from ..fem import moduli_of
 from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays
+from ..quadrature import local_functions
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
 # Stiffness of supports in the last term, relative to the elements beside them.
@@ -138,12 +139,8 @@ class _Forms:
     def on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
         """Right side (n,) of the boundary terms."""
         boundary, size = self.solution.boundary, self.space.ndof
-        shape = []
-        for j in range(self.functions):
-            function = ng.GridFunction(self.space)
-            function.vec.FV().NumPy()[j :: self.functions] = 1.0
-            shape.append(ng.BoundaryFromVolumeCF(function))
-        shapes = ng.CF(tuple(shape))
+        numbers = np.arange(size).reshape(-1, self.functions)
+        shapes = ng.BoundaryFromVolumeCF(local_functions(self.space, numbers))
         A, b = sp.csr_array((size, size)), np.zeros(size)
         for term in terms:
             k, c = term.residual.shape

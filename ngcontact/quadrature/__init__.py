@@ -4,6 +4,7 @@ from .cells import SampledElements as SampledElements
 from .cells import composite as composite
 from .cells import evaluations as evaluations
 from .cells import lattice as lattice
+from .cells import local_functions as local_functions
 from .features import Unresolved as Unresolved
 from .features import features_of as features_of
 from .features import unresolved as unresolved

@@ -253,6 +253,14 @@ def refined(
     )
 
 
+def local_functions(space: ng.FESpace, numbers: Index) -> ng.CoefficientFunction:
+    """The q functions of each of n elements of a discontinuous space, (q,), by `numbers` (n, q)."""
+    functions = [ng.GridFunction(space) for _ in numbers.T]
+    for function, own in zip(functions, numbers.T, strict=True):
+        function.vec.FV().NumPy()[own] = 1.0
+    return ng.CF(tuple(functions))
+
+
 class _Count:
     """Points since the start of the process."""
 

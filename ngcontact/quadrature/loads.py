@@ -24,6 +24,7 @@ from .cells import (
     divisions,
     gauss_rule,
     inward,
+    local_functions,
     missed_by_polynomials,
     monomials,
     refined,
@@ -195,11 +196,8 @@ def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.G
     moments = np.add.reduceat(moments, first, axis=0)
     # The q functions of an element, one by one, and matrices (j, q, q) to them from monomials.
     space, number = (ng.L2 if dim == 2 else ng.SurfaceL2), math.comb(degree + dim, dim)
-    functions = []
-    for j in range(number):
-        functions.append(ng.GridFunction(space(view.mesh, order=degree)))
-        functions[-1].vec.FV().NumPy()[j::number] = 1.0
-    shapes = ng.CF(tuple(functions))
+    at = elements[:, None] * number + np.arange(number)
+    shapes = local_functions(space(view.mesh, order=degree), at)
     nodes = [k for k in itertools.product(range(degree + 1), repeat=dim) if sum(k) <= degree]
     x = np.array(nodes) / degree
     change = np.linalg.solve(monomials(2 * x - 1, degree), view.evaluate(shapes, elements, x))
@@ -211,8 +209,7 @@ def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.G
     coefficients = np.linalg.solve(mass, moments)
     count = moments.shape[2]
     projection = ng.GridFunction(space(view.mesh, order=degree, dim=count))
-    at = (elements[:, None] * number + np.arange(number)).ravel()
-    projection.vec.FV().NumPy().reshape(-1, count)[at] = coefficients.reshape(-1, count)
+    projection.vec.FV().NumPy().reshape(-1, count)[at] = coefficients
     measure = view.evaluate(view.measure, cells.element, points)
     values = values / measure
     unit = power_of_two(values)

@@ -8,7 +8,7 @@ import numpy as np
 from ...arrays import Array, Index
 from ...contact import WHOLE_SHARE, ContactState, jacobian, partners, rays, with_vertices
 from ...fem import BoundaryTrace, FacetTrace
-from ...problem import MeshArrays
+from ...quadrature import local_functions
 from ...reference import triangle
 from ...solved import Solved
 
@@ -81,24 +81,16 @@ def _fitted(
     """
     if not len(segments):
         return field
-    space, (k, g) = field.space, values.shape
-    vertices = MeshArrays(trace.mesh).facets[segments]
-    order = np.argsort(vertices, axis=1) @ 3 ** np.arange(1, vertices.shape[1] + 1)
-    order += trace.axis[segments]  # nodes are others there
-    places = s.reshape(k, g, -1)
-    # NGSolve's segment runs from the second vertex to the first.
-    at = places[..., :2] if places.shape[-1] > 1 else 1 - places[..., [0, 0]]
-    shapes = np.zeros((k, g, len(space.GetDofNrs(ng.ElementId(ng.BND, int(segments[0]))))))
-    for kind in np.unique(order):
-        some = np.flatnonzero(order == kind)
-        element = space.GetFE(ng.ElementId(ng.BND, int(segments[some[0]])))
-        points = at[some[0]].tolist()
-        shapes[some] = np.array([element.CalcShape(x, y, 0.0).NumPy() for x, y in points])
+    at = (field.space.GetDofNrs(ng.ElementId(ng.BND, int(i))) for i in segments)
+    numbers = np.array(list(at))
+    functions = local_functions(field.space, numbers)
+    places = s.reshape(values.size, *np.shape(trace.vertices)[1:])
+    shapes = trace.evaluate(functions, segments.repeat(values.shape[1]), places)
+    shapes = shapes.reshape(*values.shape, -1)
     weighted = shapes if weights is None else weights[..., None] * shapes
     weighted = weighted.transpose(0, 2, 1)
     found = np.linalg.solve(weighted @ shapes, weighted @ values[..., None])[..., 0]
-    numbers = [space.GetDofNrs(ng.ElementId(ng.BND, int(i))) for i in segments]
-    field.vec.FV().NumPy()[np.array(numbers)] = found
+    field.vec.FV().NumPy()[numbers] = found
     return field
 
 
