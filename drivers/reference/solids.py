@@ -12,7 +12,7 @@ from drivers.reference.axisymmetric import huber
 from drivers.reference.cases import BLOCKS, FIRST, SECOND
 from drivers.reference.westergaard import CF, effective_modulus
 from ngcontact import Contact, Problem, Solution
-from ngcontact.fem.solid import SOLID_MODEL
+from ngcontact.fem.model import SOLID_MODEL
 
 
 class HertzOfSolids(NamedTuple):

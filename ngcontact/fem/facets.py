@@ -23,8 +23,7 @@ from ..mesh import CadFace, beyond_faces, cad_faces, face_normals
 from ..problem import POSITION, MeshArrays
 from ..reference import triangle
 from .boundary import CORNER, CORNER_WITHOUT_CAD, CURVED_DISTANCE, BoundaryTrace, segment_trace
-from .model import PLANE, Model
-from .solid import SOLID_MODEL
+from .model import PLANE, SOLID_MODEL, Model
 
 ENTRY_ROUND_OFF = 1e-13  # of changes of basis, whose entries are of size 1: round-off
 

@@ -25,9 +25,8 @@ from ..problem import (
 )
 from ..quadrature import composite, loads_of
 from .boundary import Bodies, BoundaryTrace, node_basis, vector_space
-from .model import MODELS, Model
+from .model import MODELS, SOLID_MODEL, Model
 from .moduli import rough_moduli
-from .solid import SOLID_MODEL
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 CANCELLED_ENERGY = 1e-6  # energy relative to its terms below which fewer than ten digits are left
