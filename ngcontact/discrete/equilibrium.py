@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -17,7 +18,7 @@ from netgen.occ import OCCGeometry
 from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
-from ..arrays import Array, Mask, across, rotations
+from ..arrays import Array, Index, Mask, across, rotations
 from ..constraints import BasisTransformation, Conditions, Rows
 from ..errors import NoEquilibriumError
 from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
@@ -407,52 +408,45 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
     None where all loads are numbers: those of V_h are exact.
     """
     trace, bodies = free.space.trace, free.bodies
-    mesh, model = trace.mesh, trace.model
-    loads = loads_of(problem, mesh)
+    loads, measured = loads_of(problem, trace.mesh), _adaptively if problem.dim == 2 else _by_rules
     if all(numbers(load.data) for load in loads):
         return None
-    if model.dim == 3:
-        return _integrated_work(loads, free)
+    arrays = trace.arrays
+    body = {ng.VOL: bodies.of_vertex[arrays.elements[:, 0]], ng.BND: bodies.of_segment}
+    region = {ng.VOL: arrays.bodies, ng.BND: arrays.boundaries}
     work, error = np.zeros((2, free.combinations.shape[1]))
-    for load in loads:
-        view, density = SampledElements(mesh, 2 if load.kind == "force" else 1), load.density
-        found = load.where_rough(free.space.V.globalorder)
-        rough = None if found is None else found.rough
-        inside = view.inside(load.region)
-        for b, ((x, y), size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
-            amounts = free.of_bodies[b]
-            moving = np.flatnonzero(amounts.any(axis=0))
-            here = inside[bodies.of_vertex[view.ends[inside, 0]] == b]
-            if here.size and moving.size:
-                turn = ((ng.x - x) * density[1] - (ng.y - y) * density[0]) / size
-                parts = amounts[:, moving].T.tolist()
-                powers = [r * density[0] + s * density[1] + t * turn for r, s, t in parts]
-                power = model.weighted(ng.CF(tuple(powers)))
-                work_here, error_here = view.integral(power, here, rough)
-                work[moving] += work_here
-                error[moving] += error_here
+    for load, (b, amounts) in itertools.product(loads, enumerate(free.of_bodies)):
+        kind, loaded = load.region.VB(), np.array(load.region.Mask())
+        here = np.flatnonzero((body[kind] == b) & loaded[region[kind]])
+        moving = np.flatnonzero(amounts.any(axis=0))  # each motion is of one body
+        if here.size and moving.size:
+            fields = [free.motion(one).field(0) for one in np.eye(len(work))[moving]]
+            powers = tuple(ng.InnerProduct(load.density, field) for field in fields)
+            power, order = trace.model.weighted(ng.CF(powers)), free.space.V.globalorder
+            work_here, error_here = measured(load, power, here, order)
+            work[moving] += work_here
+            error[moving] += error_here
     return work, error
 
 
-def _integrated_work(loads: Sequence[Load], free: FreeMotions) -> tuple[Array, Array]:
-    """The work of loads on solids; its error is the difference of two rules of quadrature."""
-    space, bodies = free.space, free.bodies
-    mesh, count = space.trace.mesh, len(free.combinations[0])
-    found = np.zeros((2, count))
-    body = {ng.VOL: bodies.of_vertex[space.trace.arrays.elements[:, 0]], ng.BND: bodies.of_segment}
-    for load in loads:
-        of = body[load.region.VB()]
-        for r, b in itertools.product(range(count), range(len(bodies.names))):
-            if not free.of_bodies[b, :, r].any():
-                continue
-            motion = free.motion(np.eye(count)[r])
-            power = load.density * motion.field(motion.bodies.index(bodies.names[b]))
-            for rule, order in enumerate((LOAD_ORDER, LOAD_ORDER + ADDED_DEGREES)):
-                parts = ng.Integrate(
-                    power, mesh, definedon=load.region, order=order, element_wise=True
-                )
-                found[rule, r] += np.asarray(parts)[of == b].sum()
-    return found[1], np.abs(found[1] - found[0])
+def _adaptively(
+    load: Load, power: ng.CoefficientFunction, elements: Index, order: int
+) -> tuple[Array, Array]:
+    """Integrals (c,) of `power` (c,) over `elements` (k,), of a load, and their errors (c,)."""
+    found = load.where_rough(order)
+    view = SampledElements(load.region.mesh, 2 if load.kind == "force" else 1)
+    return view.integral(power, elements, None if found is None else found.rough)
+
+
+def _by_rules(
+    load: Load, power: ng.CoefficientFunction, elements: Index, order: int
+) -> tuple[Array, Array]:
+    """The same of solids; errors are the differences of two rules of quadrature."""
+    where: dict[str, Any] = {"definedon": load.region, "element_wise": True}
+    orders, mesh = (LOAD_ORDER, LOAD_ORDER + ADDED_DEGREES), load.region.mesh
+    found = [[ng.Integrate(one, mesh, order=k, **where) for one in power] for k in orders]
+    coarse, fine = np.asarray(found)[..., elements].sum(axis=2)
+    return fine, np.abs(fine - coarse)
 
 
 def _change_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion | None = None) -> Array:
