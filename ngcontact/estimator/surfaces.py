@@ -8,7 +8,6 @@ at between the points of quadrature.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,34 +22,25 @@ from ..contact import (
 )
 from ..fem import BoundaryTrace, FacetTrace
 from ..reference import triangle
-from .terms import BoundaryResidual, BoundaryTerms, Parts, ScaledSolution, Squares
+from .terms import BoundaryPoints, BoundaryResidual, BoundaryTerms, Parts, ScaledSolution, Squares
 
 DATA_DEGREE = 4  # of quadrature above the discrete terms, for the data
 NO_PARTS = Parts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))  # of lines
 
 
-@dataclass(frozen=True, eq=False)
-class SurfacePoints:
-    """Points of quadrature on facets."""
-
-    facet: Index  # (k,)
-    s: Array  # (k, 3) barycentric coordinates
-    weight: Array  # (k,) areas
-
-
-def _points(trace: BoundaryTrace, facets: Index, degree: int) -> SurfacePoints:
+def _points(trace: BoundaryTrace, facets: Index, degree: int) -> BoundaryPoints:
     """Points on whole `facets` (j,), exact for polynomials of a degree on straight ones."""
     s, w = triangle.gauss(degree)
     every, places = trace.at_places(facets, s)
     weight = trace.surface_element(every, places) * np.tile(w, len(facets))
-    return SurfacePoints(every, places, weight)
+    return BoundaryPoints(every, places, weight)
 
 
 def _residual(
-    solution: ScaledSolution, points: SurfacePoints, name: str, values: Array, factor: float = 1.0
+    solution: ScaledSolution, points: BoundaryPoints, name: str, values: Array, factor: float = 1.0
 ) -> BoundaryResidual:
     """Residual tractions `values` (k, c), with their weight (h / p) / 2mu."""
-    element = solution.boundary.element[points.facet]
+    element = solution.boundary.element[points.segment]
     weight = factor * solution.edge_weight[element] * points.weight
     return BoundaryResidual(name, element, weight, values, [])
 
@@ -70,24 +60,24 @@ def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTe
     """Residuals of (3.6), (3.7), (3.8) on `facets` (j,) of no pair; the rest is free."""
     problem, trace = solution.problem, solution.boundary
     points = _points(trace, facets, 2 * solution.order + DATA_DEGREE)
-    t, element = solution.traction(points.facet, points.s), trace.element[points.facet]
+    t, element = solution.traction(points.segment, points.s), trace.element[points.segment]
     held = np.zeros(t.shape, dtype=bool)
     miss = np.zeros(t.shape)
     for pattern, components in problem.displacement.items():
-        at = np.flatnonzero(trace.lies_on(points.facet, pattern))
-        u = trace.evaluate(solution.displacement, points.facet[at], points.s[at])
+        at = np.flatnonzero(trace.lies_on(points.segment, pattern))
+        u = trace.evaluate(solution.displacement, points.segment[at], points.s[at])
         for axis, value in enumerate(components):
             if value is not None:
-                given = trace.evaluate(value, points.facet[at], points.s[at])[:, 0]
+                given = trace.evaluate(value, points.segment[at], points.s[at])[:, 0]
                 miss[at, axis], held[at, axis] = u[:, axis] - given, True
     for pattern in problem.traction:
-        at = np.flatnonzero(trace.lies_on(points.facet, pattern))
+        at = np.flatnonzero(trace.lies_on(points.segment, pattern))
         load = problem.traction_vector(pattern)
-        t[at] -= trace.evaluate(load, points.facet[at], points.s[at]) / solution.unit  # (3.7)
+        t[at] -= trace.evaluate(load, points.segment[at], points.s[at]) / solution.unit  # (3.7)
     t[held] = 0.0
     if problem.guide is not None:  # (3.8): no shear
-        at = np.flatnonzero(trace.lies_on(points.facet, problem.guide))
-        n = trace.normal(points.facet[at], points.s[at])
+        at = np.flatnonzero(trace.lies_on(points.segment, problem.guide))
+        n = trace.normal(points.segment[at], points.s[at])
         t[at] -= (t[at] * n).sum(axis=1)[:, None] * n
     squares = 2 * solution.mu[element] / solution.diameter[element] * points.weight
     squares = squares * ((miss / solution.strain) ** 2).sum(axis=1)  # (3.6)
@@ -152,20 +142,20 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     local, facing = each.local, each.facing
     own = _on_parts(trace, zone.segments[parts.local], parts, s, w)
     d = interpolated_rays(trace, zone.contact, zone.segments, local, own.s)
-    n = trace.normal(own.facet, own.s)
+    n = trace.normal(own.segment, own.s)
     cosine = (n * d).sum(axis=1)
     weight = own.weight * np.abs(cosine)  # across the direction
     pi = discrete_pressure(trace, pair, local, own.s) / solution.unit
     if zone.contact.direction is None:
         weight, cosine = own.weight, np.ones(len(cosine))
     full = _in_contact(pair)[local]
-    element = trace.element[own.facet]
-    u = trace.evaluate(solution.displacement, own.facet, own.s)
-    t = solution.traction(own.facet, own.s) / np.abs(cosine)[:, None]
+    element = trace.element[own.segment]
+    u = trace.evaluate(solution.displacement, own.segment, own.s)
+    t = solution.traction(own.segment, own.s) / np.abs(cosine)[:, None]
     sides = [(element, t, 1.0)]
     distance = np.zeros(len(pi))
     if zone.contact.primary is not None:
-        x = trace.point(own.facet, own.s)
+        x = trace.point(own.segment, own.s)
         there, distance = opposite(trace, x, d, facing, each.opposite)
         across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
         u = u - trace.evaluate(solution.displacement, facing, there)
@@ -173,7 +163,7 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
         sides.append((trace.element[facing], other, -1.0))
     if zone.contact.gap is not None:
         distance = prescribed_gap(
-            zone.contact, trace, own.facet, own.s, trace.point(own.facet, own.s)
+            zone.contact, trace, own.segment, own.s, trace.point(own.segment, own.s)
         )
     gap = (distance - (u * d).sum(axis=1)) / solution.strain
     along = [sign * (t * d).sum(axis=1) + pi for _, t, sign in sides]
@@ -199,7 +189,7 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
         squares.append(Squares("complementarity", e, product * share))
     rest = np.concatenate([zone.segments[alone], zone.facing[~met]])
     points = _points(trace, rest, degree)
-    free = solution.traction(points.facet, points.s)
+    free = solution.traction(points.segment, points.s)
     residuals.append(_residual(solution, points, "boundary", free))
     both_sides = np.concatenate([zone.segments, zone.facing])
     return BoundaryTerms(residuals, squares, NO_PARTS), both_sides
@@ -207,8 +197,8 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
 
 def _on_parts(
     trace: FacetTrace, facets: Index, parts: FacingPieces, s: Array, w: Array
-) -> SurfacePoints:
+) -> BoundaryPoints:
     """Points `s` (g, 3) with weights `w` (g,) of all parts, on their `facets` (r,)."""
     facet, places = np.repeat(facets, len(s)), parts.places(s)
     weight = trace.surface_element(facet, places) * (parts.share[:, None] * w).ravel()
-    return SurfacePoints(facet, places, weight)
+    return BoundaryPoints(facet, places, weight)

@@ -21,7 +21,7 @@ class BoundaryPoints(NamedTuple):
     """Points of quadrature on the boundary, in order along segments."""
 
     segment: Index  # (k,)
-    s: Array  # (k,), parameters on them
+    s: Array  # (k,), parameters on them, on facets (k, 3)
     weight: Array  # (k,)
 
 

@@ -56,29 +56,6 @@ def _edge_coefficients(order: int, axis: int) -> Array:
     return np.asarray(np.linalg.inv(edge_bubbles(order, axis)) @ values)
 
 
-def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
-    """Matrix (n, n) from node values on `segments` (k,) and other unknowns to those of NGSolve."""
-    order, size = trace.order, trace.space.ndof
-    if order == 1:
-        return sp.eye_array(size, format="csr")
-    nodes, axis = trace.nodes[segments], trace.axis[segments]
-    falling = nodes[:, 0] > nodes[:, -1]
-    nodes = np.where(falling[:, None], nodes[:, ::-1], nodes)
-    axis = np.where(falling, -axis, axis)
-    _, first = np.unique(nodes[:, 1], return_index=True)
-    nodes, axis = nodes[first], axis[first]
-    count = np.ones(size + 1, dtype=np.int32)  # of entries in rows, of the identity but ...
-    count[0], count[nodes[:, 1:-1] + 1] = 0, order + 1
-    starts = np.cumsum(count, dtype=np.int32)
-    columns = np.repeat(np.arange(size, dtype=np.int32), count[1:])
-    values = np.ones(len(columns))
-    places = starts[nodes[:, 1:-1]][:, :, None] + np.arange(order + 1)  # ... on edges
-    columns[places] = nodes[:, None]
-    for end in set(axis.tolist()):
-        values[places[axis == end]] = _edge_coefficients(order, end)
-    return sp.csr_array((values, columns, starts), (size, size))
-
-
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
     """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
     if mesh.dim == 3:  # `mesh.nedge` counts edges of no element after bisections
@@ -307,7 +284,25 @@ class BoundaryTrace:
 
     def nodal_basis(self, segments: Index) -> sp.csr_array:
         """Matrix (n, n) from node values on `segments` (k,) and other unknowns to NGSolve's."""
-        return nodal_basis(self, segments)
+        order, size = self.order, self.space.ndof
+        if order == 1:
+            return sp.eye_array(size, format="csr")
+        nodes, axis = self.nodes[segments], self.axis[segments]
+        falling = nodes[:, 0] > nodes[:, -1]
+        nodes = np.where(falling[:, None], nodes[:, ::-1], nodes)
+        axis = np.where(falling, -axis, axis)
+        _, first = np.unique(nodes[:, 1], return_index=True)
+        nodes, axis = nodes[first], axis[first]
+        count = np.ones(size + 1, dtype=np.int32)  # of entries in rows, of the identity but ...
+        count[0], count[nodes[:, 1:-1] + 1] = 0, order + 1
+        starts = np.cumsum(count, dtype=np.int32)
+        columns = np.repeat(np.arange(size, dtype=np.int32), count[1:])
+        values = np.ones(len(columns))
+        places = starts[nodes[:, 1:-1]][:, :, None] + np.arange(order + 1)  # ... on edges
+        columns[places] = nodes[:, None]
+        for end in set(axis.tolist()):
+            values[places[axis == end]] = _edge_coefficients(order, end)
+        return sp.csr_array((values, columns, starts), (size, size))
 
     def same_nodes(self, other: BoundaryTrace) -> bool:
         """Whether the nodes are those of another trace, with the same unknowns."""
@@ -495,8 +490,8 @@ def boundary_corners(trace: BoundaryTrace) -> BoundaryCorners:
     vertex, start = vertex[count == 2], start[count == 2]
     sides = np.repeat(outer, 2)[order][start[:, None] + [0, 1]]
     at_end = (trace.nodes[sides][..., -1] == vertex[:, None]).astype(float)
-    one, other = (trace.exact_normal(sides[:, k], at_end[:, k]) for k in (0, 1))
-    turn = np.arccos(np.clip((one * other).sum(axis=1), -1, 1))
+    normals = trace.exact_normal(sides.ravel(), at_end.ravel()).reshape(-1, 2, 2)
+    turn = np.arccos(np.clip(normals.prod(axis=1).sum(axis=1), -1, 1))
     inwards = trace.arrays.angles[vertex] > np.pi  # that of the mesh is near
     return BoundaryCorners(vertex, sides, np.pi + np.where(inwards, turn, -turn))
 

@@ -9,7 +9,6 @@ from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference.cases import LINE
 from ngcontact.fem import boundary_trace
-from ngcontact.fem.boundary import nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from tests.mesh.test_curving import glued
 
@@ -56,7 +55,7 @@ every_mesh = pytest.mark.parametrize("make", MESHES.values(), ids=list(MESHES))
 @every_mesh
 def test_nodal_basis_reproduces_node_values(make, order):
     trace = boundary_trace(make(order), order)
-    basis = nodal_basis(trace, np.arange(len(trace.region)))
+    basis = trace.nodal_basis(np.arange(len(trace.region)))
     values = np.random.default_rng(order).normal(size=trace.space.ndof)
     field = ng.GridFunction(trace.space)
     field.vec.FV().NumPy()[:] = basis @ values
