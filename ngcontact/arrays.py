@@ -11,6 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import connected_components, depth_first_order
 
 Array: TypeAlias = NDArray[np.float64]
 Index: TypeAlias = NDArray[np.intp]
@@ -84,6 +85,24 @@ def joined(records: Sequence[Record]) -> Record:
         return sp.vstack(arrays, format="csr") if sp.issparse(arrays[0]) else np.concatenate(arrays)
 
     return kind(*map(stacked, _names(kind)))
+
+
+def paths(links: Index, count: int) -> list[Index]:
+    """Numbers (j,) of points along each of the curves that `links` (l, 2) make of `count` points.
+
+    A closed one ends where it starts.
+    """
+    graph = from_triplets(np.ones(len(links)), links[:, 0], links[:, 1], (count, count))
+    degree = np.bincount(links.ravel(), minlength=count)
+    _, part = connected_components(graph, directed=False)
+    # Each from one of its two ends on, or, where there is none, around and back.
+    _, starts = np.unique(part[order := np.argsort(degree, kind="stable")], return_index=True)
+    found = []
+    for start in order[starts]:
+        path = depth_first_order(graph, start, directed=False, return_predecessors=False)
+        closed = degree[start] == 2 and len(path) > 2
+        found.append(np.append(path, start) if closed else path)
+    return found
 
 
 def across(d: Array) -> Array:

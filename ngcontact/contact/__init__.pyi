@@ -20,6 +20,7 @@ from .line import ContactLine as ContactLine
 from .line import by_line as by_line
 from .line import in_contact as in_contact
 from .line import links as links
+from .line import neighbours as neighbours
 from .line import twins as twins
 from .line import without as without
 from .nodal import jacobian as jacobian

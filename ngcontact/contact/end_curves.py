@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components, depth_first_order
 
-from ..arrays import Array, Index, Mask, from_triplets
+from ..arrays import Array, Index, Mask, paths
 from ..fem import FacetTrace, contact_modulus
 from ..problem import Problem
 from ..reference import triangle
@@ -133,21 +132,7 @@ def curves_at_ends(zone: SignedDistance) -> list[Array]:
     x = zone.trace.point(zone.segments[facet[row]], (1 - t) * nodes[i] + t * nodes[j])
     names = np.sort(np.stack([zone.name[facet[row], i], zone.name[facet[row], j]], axis=1), axis=1)
     _, at, number = np.unique(names, axis=0, return_index=True, return_inverse=True)
-    return [x[at[curve]] for curve in _curves(number.reshape(-1, 2), len(at))]
-
-
-def _curves(links: Index, count: int) -> list[Index]:
-    """Numbers (j,) of points along each curve that `links` (l, 2) make of `count` points."""
-    graph = from_triplets(np.ones(len(links)), links[:, 0], links[:, 1], (count, count))
-    degree = np.bincount(links.ravel(), minlength=count)
-    _, part = connected_components(graph, directed=False)
-    # Each from one of its two ends on, or, where there is none, around and back.
-    _, starts = np.unique(part[order := np.argsort(degree, kind="stable")], return_index=True)
-    curves = []
-    for start in order[starts]:
-        path = depth_first_order(graph, start, directed=False, return_predecessors=False)
-        curves.append(np.append(path, start) if degree[start] == 2 else path)
-    return curves
+    return [x[at[curve]] for curve in paths(number.reshape(-1, 2), len(at))]
 
 
 def area_in_contact(zone: SignedDistance, state: ContactState) -> float:

@@ -111,6 +111,13 @@ def links(line: ContactLine) -> Index:
     return pairs[(pairs >= 0).all(axis=1)]
 
 
+def neighbours(line: ContactLine) -> Index:
+    """Pairs (l, 2) of contact points along a plane line, over nodes without one, and of corners."""
+    segment, place = np.nonzero(line.rows >= 0)
+    point, same = line.rows[segment, place], segment[1:] == segment[:-1]
+    return np.concatenate([np.column_stack([point[:-1], point[1:]])[same], twins(line)])
+
+
 def twins(line: ContactLine) -> Index:
     """Pairs (t, 2) of contact points that share a node."""
     order = np.argsort(line.node, kind="stable")

@@ -1,4 +1,4 @@
-"""Nodes of curved triangles and tetrahedra, values of a solution there; neighbours on curves."""
+"""Nodes of curved triangles and tetrahedra, values of a solution there."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import minimum_spanning_tree
-from scipy.spatial import Delaunay, KDTree
+from scipy.spatial import Delaunay
 
-from ..arrays import Array, Index, from_triplets
+from ..arrays import Array, Index
 from ..problem import MeshArrays
 
 # Of VTK's tetrahedra, by the numbers of their vertices.
@@ -116,15 +114,3 @@ def stress_tensors(stress: Array) -> Array:
 def principal_stresses(stress: Array) -> Array:
     """Principal stresses (k, 3), the largest first, of `stress` (k, 4) or (k, 6)."""
     return np.asarray(np.linalg.eigvalsh(stress_tensors(stress))[:, ::-1])
-
-
-def neighbour_tree(points: Array) -> csr_array:
-    """Neighbours (m, m) along the curves through `points` (m, 2): tree of least total distance."""
-    near = list(range(1, min(len(points), 9) + 1))
-    distance, neighbour = KDTree(points).query(points, k=near)
-    start = np.broadcast_to(np.arange(len(points))[:, None], neighbour.shape)
-    other = neighbour != start
-    # The two rows of a corner are at distance 0, which a sparse graph reads as "no edge".
-    weight = np.maximum(distance[other], np.finfo(float).tiny)
-    graph = from_triplets(weight, start[other], neighbour[other], (len(points), len(points)))
-    return minimum_spanning_tree(graph)

@@ -9,16 +9,15 @@ from typing import Any, NamedTuple
 
 import ngsolve as ng
 import numpy as np
-from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, Mask, across
+from ..arrays import Array, Index, Mask, across, paths
+from ..contact import neighbours
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS, MeshArrays
 from ..solved import Solved, full_stress
 from .nodes import (
     Nodes,
-    neighbour_tree,
     nodes_of,
     principal_stresses,
     subdivision,
@@ -180,42 +179,29 @@ def contact_lines(solution: Solved) -> list[ContactPath]:
     whichever body is the secondary. A pair whose points lie on separate pieces of boundary gives
     several lines, one behind the other.
     """
-    lines = []
-    for pair in np.unique(solution.pair).tolist():
-        rows = np.flatnonzero(solution.pair == pair)
-        points = solution.points[rows]
-        direction = solution.problem.contact[pair].direction
-        if direction is None:
-            lines += [ContactPath(pair, rows[order], s) for order, s in _arcs(points)]
-        else:
+    lines, first = list[ContactPath](), 0
+    for pair, state in enumerate(solution.pairs):
+        line, start = state.line, 0.0
+        rows, direction = first + np.arange(len(line.node)), line.contact.direction
+        first += len(rows)
+        if direction is not None and len(rows):
             axis = across(np.array(direction))
-            eta = points @ (_rising(axis) * axis)
+            eta = line.position @ (_rising(axis) * axis)
             order = np.argsort(eta, kind="stable")
             lines.append(ContactPath(pair, rows[order], eta[order]))
+        for path in paths(neighbours(line), len(rows)) if direction is None and len(rows) else ():
+            path = path[:-1] if len(path) > 1 and path[0] == path[-1] else path
+            path = path[:: int(_rising(np.diff(line.position[path[[0, -1]]], axis=0)[0]))]
+            steps = np.linalg.norm(np.diff(line.position[path], axis=0), axis=1)
+            s = start + np.concatenate([[0.0], np.cumsum(steps)])
+            lines.append(ContactPath(pair, rows[path], s))
+            start = s[-1]
     return lines
 
 
 def _rising(along: Array) -> float:
     """Sign that makes the larger component of `along` (2,) positive."""
     return -1.0 if along[np.argmax(np.abs(along))] < 0 else 1.0
-
-
-def _arcs(points: Array) -> list[tuple[Index, Array]]:
-    """Order and arc position of points on curves: walks along the tree of neighbours."""
-    tree = neighbour_tree(points)
-    _, piece = connected_components(tree, directed=False)
-    arcs: list[tuple[Index, Array]] = []
-    start = 0.0
-    for k in np.unique(piece):
-        members = np.flatnonzero(piece == k)
-        s = dijkstra(tree, directed=False, indices=members[0])[members]
-        s = dijkstra(tree, directed=False, indices=members[np.argmax(s)])[members]
-        first, last = points[members[np.argmin(s)]], points[members[np.argmax(s)]]
-        s = start + (s.max() - s if _rising(last - first) < 0 else s)
-        order = np.argsort(s, kind="stable")
-        arcs.append((members[order], s[order]))
-        start = s.max()
-    return arcs
 
 
 def zones_of(solution: Solved, lines: Sequence[ContactPath]) -> list[ContactPath]:

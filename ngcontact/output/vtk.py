@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index
+from ..contact import neighbours
 from ..estimator import Estimated
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
 from .files import check_path, replacing
-from .nodes import VTK_CELLS, neighbour_tree, nodes_of, sized, subdivision
+from .nodes import VTK_CELLS, nodes_of, sized, subdivision
 from .surface import contact_surface
 
 if TYPE_CHECKING:
@@ -250,8 +251,7 @@ def _contact(solution: Solved, sections: Sections | None) -> pyvista.PolyData:
                 fields[name] = np.concatenate([known, own.get(name, none)[others]])
         else:
             rows = np.flatnonzero(solution.pair == pair)
-            tree = neighbour_tree(points[rows]).tocoo()
-            cells.append(rows[np.column_stack([tree.row, tree.col])])
+            cells.append(rows[neighbours(solution.pairs[pair].line)])
     if sections is None and m:
         single, joined = sized(np.arange(m)[:, None]), sized(np.concatenate(cells))
         data = pyvista.PolyData(_in_space(points), verts=single, **{LINKS[solid]: joined})

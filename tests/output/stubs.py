@@ -15,6 +15,16 @@ from ngcontact.fem import MODELS
 MAXH = 0.4
 
 
+def pair_of(points, rows=None, direction=None):
+    """State of a pair with these points, on segments of two if `rows` are left out."""
+    every = np.arange(len(points))
+    rows = np.column_stack([every[:-1], every[1:]]) if rows is None else rows
+    node = np.unique(points, axis=0, return_inverse=True)[1].ravel()
+    contact = SimpleNamespace(direction=direction)
+    line = SimpleNamespace(contact=contact, position=points, node=node, rows=rows)
+    return SimpleNamespace(line=line)
+
+
 @dataclass
 class Stub:
     """What the writers read of a solution, with fields chosen by the test."""
@@ -36,6 +46,12 @@ class Stub:
         self.active = self.pressure > 0.5
         self.pair = np.zeros(count, dtype=int)
         self.direction = self.points - (0.0, 1.0)  # of the disc, of radius 1
+
+    @property
+    def pairs(self):
+        contact = enumerate(self.problem.contact)
+        points = ((self.points[self.pair == k], pair.direction) for k, pair in contact)
+        return [pair_of(x, direction=direction) for x, direction in points]
 
     @property
     def indicators(self):

@@ -14,7 +14,7 @@ from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solution, write_film
 from ngcontact.output.pictures import close_ups, colour_and_mark, colour_range, cut_pressure
 from ngcontact.output.scene import Style, contact_lines, picture
-from tests.output.stubs import stub, two_bodies
+from tests.output.stubs import pair_of, stub, two_bodies
 
 
 @pytest.fixture
@@ -93,18 +93,14 @@ def test_where_nothing_is_in_contact_the_whole_line_is_shown(tmp_path, solution)
     assert high >= 1
 
 
-def lines_of(points, direction=None, pair=None):
-    contact = [SimpleNamespace(direction=direction)] * 2
-    pair = np.zeros(len(points), dtype=int) if pair is None else pair
-    solution = SimpleNamespace(points=points, pair=pair, problem=SimpleNamespace(contact=contact))
-    return contact_lines(solution)
-
-
 def test_contact_line_follows_an_arc_in_any_numbering():
     angle = np.sort(np.random.default_rng(1).uniform(0, 5.5, 60))
     shuffle = np.random.default_rng(2).permutation(60)
     points = np.column_stack([np.cos(angle), np.sin(angle)])[shuffle]
-    [(pair, rows, s)] = lines_of(points)
+    number = np.argsort(shuffle)
+    # Nodes in the middles of segments have no points.
+    segments = np.column_stack([number[:-1], np.full(59, -1), number[1:]])
+    [(pair, rows, s)] = contact_lines(SimpleNamespace(pairs=[pair_of(points, segments)]))
     along = angle[shuffle][rows]
     assert pair == 0
     assert np.all(np.diff(along) > 0) or np.all(np.diff(along) < 0)
@@ -115,7 +111,8 @@ def test_contact_line_follows_an_arc_in_any_numbering():
 
 def test_contact_line_keeps_both_rows_of_a_corner():
     points = np.array([[0, 0], [1, 0], [2, 0], [2, 0], [2, 1], [2, 2.0]])
-    [(_, rows, s)] = lines_of(points)
+    rows = np.array([[0, 1], [1, 2], [3, 4], [4, 5]])
+    [(_, rows, s)] = contact_lines(SimpleNamespace(pairs=[pair_of(points, rows)]))
     assert rows.tolist() == [0, 1, 2, 3, 4, 5]
     assert s.tolist() == [0, 1, 2, 2, 3, 4]
 
