@@ -37,6 +37,18 @@ def relative_energy_error(solution: Solution, exact: HertzOfSolids) -> float:
     return math.sqrt(square) / solution.energy_norm
 
 
+def quarter(section: occ.OCCGeometry) -> occ.OCCGeometry:
+    """Quarters of bodies of revolution about y by their meridian `section`, cut by faces "cut".
+
+    Bodies and other faces have the names of the faces and edges that sweep them.
+    """
+    axis = occ.Axis((0, 0, 0), occ.Y)
+    bodies = [face.Revolve(axis, 90) for face in section.shape.faces]
+    for face in (face for one in bodies for face in one.faces):
+        face.name = face.name or "cut"
+    return occ.OCCGeometry(occ.Compound(bodies))
+
+
 def quarter_cubes() -> occ.OCCGeometry:
     """Cubes "upper" and "lower" of size 1 above and below z = 0, x, y > 0.
 

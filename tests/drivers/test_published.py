@@ -59,7 +59,14 @@ def test_rotating_rings_of_lame_have_the_published_pressures():
     assert pressures == pytest.approx(published, rel=5e-4)  # four digits
 
 
-@pytest.mark.parametrize(("name", "max_dofs"), [("patch test", 1000), ("rotating rings", 3000)])
+@pytest.mark.parametrize(
+    ("name", "max_dofs"),
+    [
+        ("patch test", 1000),
+        ("rotating rings", 3000),
+        pytest.param("rounded punch", 50_000, marks=pytest.mark.study),
+    ],
+)
 def test_computed_figures_are_the_published_ones(name, max_dofs):
     published = PUBLISHED[name]
     solution = driver.solved(published, 2, max_dofs)
