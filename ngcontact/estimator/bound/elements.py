@@ -11,10 +11,8 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
 import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
@@ -50,7 +48,7 @@ class Element:
     force_degree: int  # of the body force that s_p balances
     axial: bool  # whether the model is axisymmetric
     on_axis: bool  # whether a side of each lies on the axis
-    compliance: Array  # (b, q, v, v) C^-1, or (1, 1, v, v) where it is one matrix for all
+    compliance: Array  # (b, q, v, v) C^-1, or (b, 1, v, v) where it is one matrix for each
     strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
     source: ng.CoefficientFunction | None  # the body force
     force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
@@ -160,15 +158,16 @@ class Multipliers:
     degree: Index  # (e,) of their polynomials, `traces`
     start: Index  # (e + 1,) the first of each side, and their number
 
-    def of(self, side: int | Index) -> Index:
-        """The k multipliers (..., k) of sides `side` (...,) of one degree."""
-        k = 2 * (int(np.max(self.degree[side])) + 1)
-        return np.add.outer(self.start[side], np.arange(k))
+    def of(self, side: Index) -> tuple[Index, Mask]:
+        """Numbers (..., k) of the multipliers of sides `side` (...,), and which of the k each has.
 
-    def by_degree(self, side: Index) -> Iterator[tuple[int, Index]]:
-        """Each degree of sides `side` (k,), and which of them, (r,), have it; none of -1."""
-        for degree in np.unique(self.degree[side[side >= 0]]).tolist():
-            yield degree, np.flatnonzero((side >= 0) & (self.degree[side] == degree))
+        There are k of the highest degree; in place of those that a side lacks stands its first.
+        """
+        n = np.arange(int(self.degree[side].max(initial=0)) + 1)
+        own = n <= self.degree[side][..., None]
+        x = self.start[side][..., None] + np.where(own, n, 0)
+        y = x + np.where(own, self.degree[side][..., None] + 1, 0)
+        return np.concatenate([x, y], axis=-1), np.concatenate([own, own], axis=-1)
 
 
 def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) -> Array:
@@ -229,33 +228,53 @@ def elements_of(
 
     Stresses are of a `degree` on triangles with straight sides.
     """
-    mu = multipliers(problem, cells, degree)
-    key = np.column_stack(
-        [mu.of_stress, cells.on_axis, mu.degree[cells.sides], cells.curved, cells.bodies]
-    )
+    mu, data = multipliers(problem, cells, degree), BodyData.of(problem, cells.trace.mesh)
+    highest = mu.degree[cells.sides].max(axis=1)
+    varying = data.varies[cells.bodies]
+    key = np.column_stack([mu.of_stress, highest, cells.on_axis, cells.curved, varying])
     kinds, number = np.unique(key, axis=0, return_inverse=True)
-    found = []
+    strain, found = elastic_strain(problem, displacement), []
     for kind, own_degree in enumerate(kinds[:, 0]):
         every = np.flatnonzero(number.ravel() == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // BATCH_ENTRIES):
-            found.append(_element(problem, cells, displacement, mu, at))
+            found.append(_element(data, cells, strain, mu, at))
     return mu, found
 
 
-def _of_body(values: Mapping[str, Any], cells: Cells, at: Index) -> Any:
-    """Entry of data by patterns of names for the body of triangles `at` (b,), or None."""
-    mesh, body = cells.trace.mesh, int(cells.bodies[at[0]])
-    return next((value for k, value in values.items() if mesh.Materials(k).Mask()[body]), None)
+@dataclass(frozen=True, eq=False)
+class BodyData:
+    """Laws and forces of all bodies, n of them, as functions on the mesh."""
 
+    stiffness: ng.CoefficientFunction  # C, Voigt
+    force: ng.CoefficientFunction | None  # None without any
+    law_varies: Mask  # (n,)
+    varies: Mask  # (n,) where a law, an initial strain or a force is no number
 
-def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
-    """C^-1 at places of one body, (b, q, v, v) or, of a law of numbers, (1, 1, v, v)."""
-    law = _of_body(problem.materials, cells, points.at)
-    C = law.voigt(problem.model)
-    middle = points.at[:1], np.full((1, 2), 1 / 3)
-    C = points.evaluate(cells, C) if varies(law) else cells.evaluate(C, *middle)[None]
-    v = round(C.shape[-1] ** 0.5)
-    return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
+    @staticmethod
+    def of(problem: Problem, mesh: ng.Mesh) -> BodyData:
+        """The data of a problem."""
+        laws = {k: law.voigt(problem.model) for k, law in problem.materials.items()}
+        forces = [k for k, force in problem.force.items() if not numbers(force)]
+
+        def where(patterns: Iterable[str]) -> Mask:
+            return np.any([list(mesh.Materials(k).Mask()) for k in ["", *patterns]], axis=0)
+
+        return BodyData(
+            mesh.MaterialCF(laws),
+            mesh.MaterialCF(problem.force, default=ng.CF((0, 0))) if problem.force else None,
+            where(k for k, law in problem.materials.items() if varies(law)),
+            where([*problem.varying, *forces]),
+        )
+
+    def compliance(self, cells: Cells, points: Places) -> Array:
+        """C^-1 at places, (b, q, v, v) or, where laws are numbers in all bodies, (b, 1, v, v)."""
+        if self.law_varies[cells.bodies[points.at]].any():
+            C = points.evaluate(cells, self.stiffness)
+        else:
+            middle = np.full((len(points.at), 2), 1 / 3)
+            C = cells.evaluate(self.stiffness, points.at, middle)[:, None]
+        v = round(C.shape[-1] ** 0.5)
+        return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
 
 def projection(
@@ -277,27 +296,16 @@ def projection(
 
 
 def _element(
-    problem: Problem,
-    cells: Cells,
-    displacement: ng.CoefficientFunction,
-    mu: Multipliers,
-    at: Index,
+    data: BodyData, cells: Cells, strain_of: ng.CoefficientFunction, mu: Multipliers, at: Index
 ) -> Element:
-    """Triangles `at` (b,) of one kind, condensed."""
-    model, degree, on_axis = (
-        cells.trace.model,
-        int(mu.of_stress[at[0]]),
-        bool(cells.on_axis[at[0]]),
-    )
-    axial, curved = model.extent > 0, bool(cells.curved[at[0]])
-    law = _of_body(problem.materials, cells, at)
-    source = _of_body(problem.force, cells, at)
-    varying = law in problem.varying.values() or (source is not None and not numbers(source))
+    """Triangles `at` (b,) of one kind, condensed, for a strain."""
+    degree, on_axis = int(mu.of_stress[at[0]]), bool(cells.on_axis[at[0]])
+    axial, curved = cells.trace.model.extent > 0, bool(cells.curved[at[0]])
+    varying, source = data.varies[cells.bodies[at]].any(), data.force
     points = places(cells, at, 2 * degree + 4 * (curved or axial or varying))
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
-    compliance = compliance_at(problem, cells, points)
-    strain = points.evaluate(cells, elastic_strain(problem, displacement))
+    compliance, strain = data.compliance(cells, points), points.evaluate(cells, strain_of)
     n = max(0, degree - 1 - axial)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
     hoop = np.zeros(points.weight.shape)
@@ -321,7 +329,7 @@ def _element(
     g, beyond = _nearest(rows @ combined, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
-    N, own = _moments(cells, mu, at, columns)
+    N, own, dofs = _moments(cells, mu, at, columns)
     return Element(
         places=points,
         corners=corners,
@@ -334,13 +342,13 @@ def _element(
         source=source,
         force=force,
         missed=missed,
-        modulus=np.broadcast_to(1 / largest, len(at)),
+        modulus=1 / largest,
         combined=combined,
         N=combined.transpose(0, 2, 1) @ N,
         own=own,
         g=g,
         beyond=beyond,
-        dofs=np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1),
+        dofs=dofs,
     )
 
 
@@ -348,7 +356,7 @@ def _weighted(T: Array, weight: Array, compliance: Array, strain: Array) -> tupl
     """Stresses T (b, q, v, n) as rows (b, q v, n) whose products are those of the norm of C^-1.
 
     And a `strain` (b, q, v) as one (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
-    (b, q, v, v) or (1, 1, v, v).
+    (b, q, v, v) or (b, 1, v, v).
     """
     L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None]
     strain = (np.linalg.inv(L) @ (root * strain)[..., None]).reshape(len(T), 1, -1)
@@ -372,16 +380,18 @@ def _moments(
     mu: Multipliers,
     at: Index,
     columns: Callable[[Array, Array], tuple[Array, Array]],
-) -> tuple[Array, Array]:
-    """Moments of tractions with the multipliers of triangles `at` (b,).
+) -> tuple[Array, Array, Index]:
+    """Moments of tractions with the multipliers of triangles `at` (b,), and their numbers (b, d).
 
     Those (b, n, d) of the first `columns` of stresses, and those (b, d) of the other.
     """
     found, degree = [], int(mu.of_stress[at[0]])
+    dofs, there = (x.reshape(len(at), -1) for x in mu.of(cells.sides[at]))
+    k = dofs.shape[1] // 6 - 1  # the highest degree of a side
     axial, corners = cells.trace.model.extent > 0, cells.corners[at]
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]
-        k, bent = int(mu.degree[side[0]]), bool(cells.bent[side[0]])
+        bent = bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + 4 * cells.trace.geometry_order * bent)
         own = np.where(back[:, None], 1 - t, t)
         x, dx = cells.around(at, i, t)
@@ -393,5 +403,5 @@ def _moments(
         for p, q in ((0, -1), (-1, 1)):
             traction = T[:, :, p] * n[..., :1] + T[:, :, q] * n[..., 1:]
             found.append(traction.transpose(0, 2, 1) @ chi)
-    N = np.concatenate(found, axis=2)
-    return N[:, :-1], N[:, -1]
+    N = np.concatenate(found, axis=2) * there[:, None]
+    return N[:, :-1], N[:, -1], dofs

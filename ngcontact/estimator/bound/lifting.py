@@ -24,7 +24,7 @@ from ...lagrange import gauss_lobatto, lagrange
 from ...linalg import cholesky, lower_half
 from ...problem import Problem
 from .cells import Cells, places
-from .elements import BATCH_ENTRIES, compliance_at
+from .elements import BATCH_ENTRIES, BodyData
 from .facing import DATA_DEGREE, POINTS, TO_LOBATTO, FacingSides
 from .polynomials import CORNERS, DERIVATIVES, derivatives
 from .tractions import BoundaryData
@@ -219,7 +219,9 @@ def _stiffness(
     problem: Problem, cells: Cells, layer: Index, degrees: Index, degree: int
 ) -> Iterator[Stiffness]:
     """Triangles of a `layer` (k,), polynomials of a `degree`, on the sides of `degrees` (e,)."""
-    key = np.column_stack([degrees[cells.sides], cells.curved, cells.bodies])[layer]
+    data = BodyData.of(problem, cells.trace.mesh)
+    varying = data.law_varies[cells.bodies]
+    key = np.column_stack([degrees[cells.sides], cells.curved, varying])[layer]
     kinds, kind = np.unique(key, axis=0, return_inverse=True)
     for k, (*own, bent, _) in enumerate(kinds.tolist()):
         every, (places_, inverse) = layer[kind.ravel() == k], _nodes(degree, *own)
@@ -229,7 +231,7 @@ def _stiffness(
             f, *by = np.moveaxis(_functions(degree, own, points.local) @ inverse, 1, 0)
             into = np.linalg.inv(points.slopes)
             gradient = into.swapaxes(2, 3) @ np.stack(by, axis=1)
-            C = np.linalg.inv(compliance_at(problem, cells, points))
+            C = np.linalg.inv(data.compliance(cells, points))
             B = np.zeros((*points.weight.shape, C.shape[-1], 2 * m))  # Voigt
             B[:, :, 0, :m] = B[:, :, -1, m:] = gradient[:, :, 0]
             B[:, :, 1, m:] = B[:, :, -1, :m] = gradient[:, :, 1]

@@ -226,16 +226,17 @@ def _basis(
         load = means[:, :, None] * line.direction.swapaxes(1, 2)[:, None]
         row = m + np.arange(line.mass.size).reshape(line.mass.shape)
         m += row.size
-        for degree, some in mu.by_degree(line.side):
+        for degree in np.unique(mu.degree[line.side]):
+            some = mu.degree[line.side] == degree
             R = (load[some] @ traces(degree, POINTS)).reshape(*row[some].shape, -1)
-            at, rest = mu.of(line.side[some]), np.linalg.svd(R)[2][:, R.shape[1] :]
+            at, rest = mu.of(line.side[some])[0], np.linalg.svd(R)[2][:, R.shape[1] :]
             plain[at] = False
             own.append(Block(row[some], at, R))
             solved.append(Block(at, at, np.linalg.inv(np.concatenate([R, rest], axis=1))))
-        for degree, some in mu.by_degree(line.other):
-            R = -(load[some] @ traces(degree, line.there[some])[:, None])
-            at = mu.of(line.other[some])
-            across.append(Block(row[some], at, R.reshape(*row[some].shape, -1)))
+        some = np.flatnonzero(line.other >= 0)
+        at, there = mu.of(line.other[some])
+        R = -(load[some] @ traces(at.shape[1] // 2 - 1, line.there[some])[:, None])
+        across.append(Block(row[some], at, R.reshape(*row[some].shape, at.shape[1]) * there[:, None]))
     part = _summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
     R = _summed(across, (m, d))
     M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary

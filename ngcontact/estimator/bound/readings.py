@@ -215,7 +215,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         }
     # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
     side = np.flatnonzero(~cells.inner)
-    traction = proof.dual.moments[mu.of(side)].reshape(len(side), 2, -1)
+    traction = proof.dual.moments[mu.of(side)[0]].reshape(len(side), 2, -1)
     position = np.full(len(cells.ends) + 1, -1)  # the last one where no side is faced
     position[side] = np.arange(len(side))
     return arrays | {
