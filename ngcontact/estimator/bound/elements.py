@@ -26,7 +26,7 @@ from .cells import Cells, Places, places
 from .polynomials import CORNERS, balancing, coordinates, projected, scalars, stresses
 
 TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
-CURVED_DEGREES = 4  # degrees by which stresses on triangles with a curved side are higher
+CURVED_DEGREES = 2  # degrees by which stresses on triangles with a curved side are higher
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 FORCE_ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BATCH_ENTRIES = 2**20  # of triangles at once, (degree + 2)^4 each: bounds the memory
