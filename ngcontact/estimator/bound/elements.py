@@ -68,6 +68,13 @@ class Element:
         mine = np.flatnonzero(own[some] == at)
         return mine, some[mine]
 
+    def part(self, rows: Index, at: Index, dofs: Index) -> Element:
+        """Its triangles `rows` (r,), which are `at` (r,) of other cells, with multipliers `dofs`."""
+        places = {k: getattr(self.places, k)[rows] for k in ("x", "slopes", "weight", "reference")}
+        names = "corners compliance strain force missed modulus combined N own g beyond".split()
+        arrays = {name: getattr(self, name)[rows] for name in names}
+        return replace(self, places=replace(self.places, at=at, **places), dofs=dofs, **arrays)
+
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
         return np.asarray(self.own + (c[:, None] @ self.N)[:, 0])
@@ -223,22 +230,43 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
+    known: Sequence[tuple[Cells, Multipliers, Sequence[Element]]] = (),
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
-    Stresses are of a `degree` on triangles with straight sides.
+    Stresses are of a `degree` on triangles with straight sides. Triangles of other cells that are
+    `known` are not condensed again.
     """
     mu, data = multipliers(problem, cells, degree), BodyData.of(problem, cells.trace.mesh)
     highest = mu.degree[cells.sides].max(axis=1)
     varying = data.varies[cells.bodies]
     key = np.column_stack([mu.of_stress, highest, cells.on_axis, cells.curved, varying])
     kinds, number = np.unique(key, axis=0, return_inverse=True)
-    strain, found = elastic_strain(problem, displacement), []
+    strain, found, rest = elastic_strain(problem, displacement), [], np.ones(len(key), dtype=bool)
+    for other, multipliers_, elements in known:
+        both = (_identity(other, multipliers_), _identity(cells, mu))
+        _, first, same = np.unique(
+            np.concatenate(both), axis=0, return_index=True, return_inverse=True
+        )
+        before = first[same.ravel()[len(both[0]) :]]
+        rest &= before >= len(both[0])
+        for e in elements:
+            at, rows = e.among(before)
+            if at.size:
+                found.append(e.part(rows, at, mu.of(cells.sides[at])[0].reshape(len(at), -1)))
+    number = np.where(rest, number.ravel(), -1)
     for kind, own_degree in enumerate(kinds[:, 0]):
-        every = np.flatnonzero(number.ravel() == kind)
+        every = np.flatnonzero(number == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // BATCH_ENTRIES):
-            found.append(_element(data, cells, strain, mu, at))
+            if at.size:
+                found.append(_element(data, cells, strain, mu, at))
     return mu, found
+
+
+def _identity(cells: Cells, mu: Multipliers) -> Array:
+    """Rows (n, 14) of numbers that are the same for triangles which are condensed alike."""
+    parts = cells.parent, cells.corners, mu.of_stress, mu.degree[cells.sides], cells.backward
+    return np.column_stack([np.asarray(x, dtype=float).reshape(len(x), -1) for x in parts])
 
 
 @dataclass(frozen=True, eq=False)
