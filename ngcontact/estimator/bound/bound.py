@@ -107,14 +107,7 @@ class DualProblem:
         for line, p in zip(lines, found.pressure, strict=True):
             work -= float((line.force(p) * line.gap).sum())
         return AdmissibleStress(
-            s=found.s,
-            pressure=found.pressure,
-            unbalanced=found.unbalanced,
-            free_force=found.free_force,
-            distance=distance,
-            loads=loads,
-            work=work,
-            residual=residual,
+            distance=distance, loads=loads, work=work, residual=residual, **vars(found)
         )
 
 

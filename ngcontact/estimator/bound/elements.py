@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+
 import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
@@ -50,7 +51,6 @@ class Element:
     on_axis: bool  # whether a side of each lies on the axis
     compliance: Array  # (b, q, v, v) C^-1, or (b, 1, v, v) where it is one matrix for each
     strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
-    source: ng.CoefficientFunction | None  # the body force
     force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
     missed: Array  # (b,) L2 norm of what of the body force s_p does not balance, times the measure
     modulus: Array  # (b,) smallest eigenvalue of C in Mandel's scaling, a stress
@@ -69,7 +69,7 @@ class Element:
         return mine, some[mine]
 
     def part(self, rows: Index, at: Index, dofs: Index) -> Element:
-        """Its triangles `rows` (r,), which are `at` (r,) of other cells, with multipliers `dofs`."""
+        """Its triangles `rows` (r,), `at` (r,) of other cells, with multipliers `dofs`."""
         places = {k: getattr(self.places, k)[rows] for k in ("x", "slopes", "weight", "reference")}
         names = "corners compliance strain force missed modulus combined N own g beyond".split()
         arrays = {name: getattr(self, name)[rows] for name in names}
@@ -90,16 +90,7 @@ class Element:
         rows, rest = _weighted(T, self.places.weight, self.compliance, strain)
         g, beyond = _nearest(rows @ self.combined, rest)
         none = {name: np.zeros_like(getattr(self, name)) for name in ("force", "missed", "own")}
-        return replace(self, strain=strain, source=None, g=g, beyond=beyond, **none)
-
-    def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
-        """Radial force times r, (k,), in triangles `at` (k,) of `cells`, about an axis.
-
-        `reference` (k, 2) are the places in the parents; units of stress.
-        """
-        if self.source is None:
-            return np.zeros(len(at))
-        return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
+        return replace(self, strain=strain, g=g, beyond=beyond, **none)
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
         """Stresses (b, q, v) at `x` (b, q, 2) in `some` (b,) of the n triangles, or in all.
@@ -329,7 +320,7 @@ def _element(
     """Triangles `at` (b,) of one kind, condensed, for a strain."""
     degree, on_axis = int(mu.of_stress[at[0]]), bool(cells.on_axis[at[0]])
     axial, curved = cells.trace.model.extent > 0, bool(cells.curved[at[0]])
-    varying, source = data.varies[cells.bodies[at]].any(), data.force
+    varying, source = bool(data.varies[cells.bodies[at]].any()), data.force
     points = places(cells, at, 2 * degree + 4 * (curved or axial or varying))
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
@@ -367,7 +358,6 @@ def _element(
         on_axis=on_axis,
         compliance=compliance,
         strain=strain,
-        source=source,
         force=force,
         missed=missed,
         modulus=1 / largest,
@@ -414,7 +404,8 @@ def _moments(
     Those (b, n, d) of the first `columns` of stresses, and those (b, d) of the other.
     """
     found, degree = [], int(mu.of_stress[at[0]])
-    dofs, there = (x.reshape(len(at), -1) for x in mu.of(cells.sides[at]))
+    number, there = mu.of(cells.sides[at])
+    dofs, there = number.reshape(len(at), -1), there.reshape(len(at), -1)
     k = dofs.shape[1] // 6 - 1  # the highest degree of a side
     axial, corners = cells.trace.model.extent > 0, cells.corners[at]
     for i in range(3):

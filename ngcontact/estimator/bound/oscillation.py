@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -48,28 +47,22 @@ def oscillation_norms(cells: Cells, forces: Array, moduli: Array, tractions: Arr
     some = (forces > 0) | (tractions > 0).any(axis=1)
     for points in (2, POINTS_ON_SIDE):  # on straight sides extrema are at ends
         at = np.flatnonzero(some & (cells.curved == (points > 2)))
-        known = _constants(cells, at, points)
-        if (known.measure <= 0).any():
+        poincare, trace, korn, measure = _constants(cells, at, points)
+        if (measure <= 0).any():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials at the axis; use "
                 "error_estimate"
             )
-        total = known.poincare * forces[at] + (known.trace * tractions[at]).sum(axis=1)
-        found[at] = known.korn * total / np.sqrt(moduli[at] * known.measure)
+        total = poincare * forces[at] + (trace * tractions[at]).sum(axis=1)
+        found[at] = korn * total / np.sqrt(moduli[at] * measure)
     return found
 
 
-class Constants(NamedTuple):
-    """Constants of b triangles, for |grad w| = 1."""
+def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, ...]:
+    """Constants of triangles `at` (b,), of which sides are looked at in that many `points`.
 
-    poincare: Array  # (b,)
-    korn: Array  # (b,)
-    trace: Array  # (b, 3)
-    measure: Array  # (b,) the model's least
-
-
-def _constants(cells: Cells, at: Index, points: int) -> Constants:
-    """Constants of triangles `at` (b,), of which sides are looked at in that many `points`."""
+    For |grad w| = 1, of Poincare (b,) and traces (b, 3); of Korn (b,); the least measure (b,).
+    """
     corners, t = cells.corners[at], np.linspace(0, 1, points)
     x, slope = cells.around(at[:, None], np.arange(3), t)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
@@ -92,7 +85,7 @@ def _constants(cells: Cells, at: Index, points: int) -> Constants:
     far, p = np.linalg.norm(away, axis=-1).max(axis=-1), poincare[:, None]
     measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), 3 * points).min(axis=1)
     trace = np.sqrt(2 * (p**2 + far * p) / least)
-    return Constants(poincare, np.sqrt(1 + 2 / beta**2), trace, measure)
+    return poincare, trace, np.sqrt(1 + 2 / beta**2), measure
 
 
 def divided(

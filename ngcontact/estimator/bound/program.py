@@ -236,7 +236,9 @@ def _basis(
         some = np.flatnonzero(line.other >= 0)
         at, there = mu.of(line.other[some])
         R = -(load[some] @ traces(at.shape[1] // 2 - 1, line.there[some])[:, None])
-        across.append(Block(row[some], at, R.reshape(*row[some].shape, at.shape[1]) * there[:, None]))
+        across.append(
+            Block(row[some], at, R.reshape(*row[some].shape, at.shape[1]) * there[:, None])
+        )
     part = _summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
     R = _summed(across, (m, d))
     M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary
