@@ -69,7 +69,7 @@ class Element:
         return mine, some[mine]
 
     def part(self, rows: Index, at: Index, dofs: Index) -> Element:
-        """Its triangles `rows` (r,), `at` (r,) of other cells, with multipliers `dofs`."""
+        """Its triangles `rows` (r,), `at` (r,) of other cells, with multipliers `dofs` (r, d)."""
         places = {k: getattr(self.places, k)[rows] for k in ("x", "slopes", "weight", "reference")}
         names = "corners compliance strain force missed modulus combined N own g beyond".split()
         arrays = {name: getattr(self, name)[rows] for name in names}
