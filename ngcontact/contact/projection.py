@@ -39,19 +39,17 @@ def none_met(size: int) -> Partners:
     return Partners(np.full(size, -1), np.zeros(size), np.full(size, np.inf))
 
 
-def _bend(curve: Array) -> Array:
-    """Bound (q,) of how far segments leave the uniform motion along their chords, lengths."""
-    ends = lagrange(1, gauss_lobatto(curve.shape[1] - 1))
-    along = np.einsum("ji,qid->qjd", ends, curve[:, [0, -1]])
-    return LEBESGUE_CONSTANT * np.linalg.norm(curve - along, axis=2).max(axis=1)
+def _bend(curve: Array) -> tuple[Array, Array]:
+    """Bounds (q,) of how far segments leave the uniform motion along their chords, lengths.
 
-
-def _turning(curve: Array, normal: Array) -> Mask:
-    """Whether segments (k, p + 1, 2) go back and forth along `normal` (k, 2)."""
+    And of how far their velocities leave that of this motion.
+    """
     degree = curve.shape[1] - 1
-    rates = lagrange_derivative(degree, gauss_lobatto(max(1, degree - 1)))
-    which, _ = zeros(max(1, degree - 1), np.einsum("ji,kid,kd->kj", rates, curve, normal))
-    return np.isin(np.arange(len(curve)), which)
+    nodes = gauss_lobatto(degree)
+    apart = curve - np.einsum("ji,qid->qjd", lagrange(1, nodes), curve[:, [0, -1]])
+    turn = np.einsum("ji,qid->qjd", lagrange_derivative(degree, nodes), apart)
+    size, rate = (LEBESGUE_CONSTANT * np.linalg.norm(x, axis=2).max(axis=1) for x in (apart, turn))
+    return size, rate
 
 
 def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Array]:
@@ -59,10 +57,10 @@ def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Arra
 
     Lines through `points` (k, 2) with the normals `normal` (k, 2).
     """
-    ends, degree = curve[:, [0, -1]], curve.shape[1] - 1
+    ends = curve[:, [0, -1]]
     slack = MATCHING_DISTANCE * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    bend = _bend(curve)
-    bend[bend <= slack] = 0.0  # straight
+    bend, turn = _bend(curve)
+    bend[bend <= slack] = turn[bend <= slack] = 0.0  # straight
     reach = slack + bend
     block = max(1, PAIRS_AT_ONCE // max(1, len(curve)))
     pairs, places = [], []
@@ -77,12 +75,10 @@ def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Arra
         s = np.clip(np.divide(a, a - b, out=np.full(a.shape, 0.5), where=a != b), 0, 1)
         passes = np.minimum(a, b) <= slack[segment]
         passes &= np.maximum(a, b) >= -slack[segment]
-        # Markov: what is no larger than the bend on [0, 1] has a slope up to 2 p^2 times that.
-        turns = np.flatnonzero(np.abs(a - b) <= 2 * degree**2 * bend[segment])
+        turns = np.flatnonzero(np.abs(a - b) <= turn[segment])
         if len(turns):
-            turns = turns[_turning(curve[segment[turns]], t[point[turns]])]
             height = np.einsum("kid,kd->ki", curve[segment[turns]], t[point[turns]])
-            which, zero = zeros(degree, height - here[point[turns], None])
+            which, zero = zeros(curve.shape[1] - 1, height - here[point[turns], None])
             passes[turns[which]] = False  # all their crossings are known
             pairs.append([point[turns[which]] + first, segment[turns[which]]])
             places.append(zero)
