@@ -53,6 +53,10 @@ from .nodal import (
 from .projection import MATCHING_DISTANCE
 
 MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which hats take its place
+# Slope of a gap that rows follow beyond the part of a segment that faces. No row asks for less than
+# the gap at its node or the least one of its segments less this share of their lengths: of strongly
+# curved sides psi, which is negative in places, made negative means of gaps that are positive.
+LARGEST_SLOPE = 0.01
 SMALLEST_SHARE = 1e-8  # of a point's weight on its whole segments, below which it carries no row
 LENGTH_STEP = 1e-6  # of the longest, in which lengths of edges are counted: round-off is no tie
 
@@ -98,11 +102,12 @@ def _dual_basis(
 
 def _integrals(
     trace: BoundaryTrace, contact: Contact, segments: Index, pieces: FacingPieces
-) -> tuple[Array, Array, sp.csr_array]:
+) -> tuple[Array, Array, sp.csr_array, Array]:
     """Integrals over the facing parts of `segments` (k,), in size (P1) or eta (P2).
 
     D_e (k, q) of the basis functions; of psi times eps, (k, q); and of psi times the functions of
-    n nodes, (k * q, n): those of the primary, less those of the secondary itself but for D_e.
+    n nodes, (k * q, n): those of the primary, less those of the secondary itself but for D_e. And
+    the least eps (k,), infinite where nothing faces.
     """
     k, r, q = len(segments), len(pieces.local), trace.nodes.shape[1]
     points, weights = trace.rule(2 * trace.order + 2 * (trace.geometry_order - 1))
@@ -113,6 +118,9 @@ def _integrals(
     w = jacobian(trace, contact, segment, s).reshape(r, g) * pieces.share[:, None] * weights
     d = interpolated_rays(trace, contact, segments, each.local, s)
     there, eps = opposite(trace, x, d, each.facing, each.opposite)
+    met = np.isfinite(np.column_stack([there, eps])).all(axis=1)
+    if not met.all():  # beside the curved facet, whose corners were clipped
+        w, eps, there[~met] = w * met.reshape(r, g), np.where(met, eps, 0.0), each.opposite[~met]
     if contact.gap is not None:
         eps = prescribed_gap(contact, trace, segment, s, x)
     phi = trace.shapes(segment, s).reshape(r, g, q)
@@ -131,7 +139,9 @@ def _integrals(
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     size = (k * q, trace.space.ndof)
     coupling = from_triplets(blocks.ravel(), row.ravel(), column.ravel(), size)
-    return weight, np.einsum("kij,kj->ki", change, gap), coupling
+    least = np.full(k, np.inf)
+    np.minimum.at(least, pieces.local, np.where(w > 0, eps.reshape(r, g), np.inf).min(axis=1))
+    return weight, np.einsum("kij,kj->ki", change, gap), coupling, least
 
 
 def _passed_on(line: ContactLine, rows: Index, held: Mask) -> Index:
@@ -180,7 +190,7 @@ def with_dual_rows(
     chosen = np.flatnonzero(~matched)
     segments, rows = line.segments[chosen], line.rows[chosen]
     pieces = divided(trace, contact, segments, line.facing, distances(trace, line)[chosen])
-    D, gaps, coupling = _integrals(trace, contact, segments, pieces)
+    D, gaps, coupling, least = _integrals(trace, contact, segments, pieces)
     here, own = (rows >= 0) & (D > 0), rows
     if fixed.any():
         rows = np.where(here, _passed_on(line, np.where(here, rows, -1), fixed), rows)
@@ -201,6 +211,9 @@ def with_dual_rows(
     weights[here] *= across
     covered[chosen] = weights
     nodal, dual, gap, whole = np.zeros((4, m))
+    least -= LARGEST_SLOPE * trace.lengths(segments)
+    lowest = np.where(facing, line.gap, np.inf)
+    np.minimum.at(lowest, point, least[here.nonzero()[0]])
     np.add.at(nodal, line.rows[matched], line.shares[matched])
     np.add.at(dual, point, weights[here])
     np.add.at(gap, point, gaps[here] * cosine)
@@ -208,12 +221,13 @@ def with_dual_rows(
     at_nodes = dual == 0
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
+    lowest[at_nodes] = -np.inf
     scale, shape = across / weight[point], (m, coupling.shape[0])
     means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
     line = replace(
         line,
         rows=points,
-        gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
+        gap=np.maximum(share * np.where(share > 0, line.gap, 0.0) + gap / weight, lowest),
         # By matched segments, without one of which the ends alone face, over a slot at order 1.
         weight=np.where(at_nodes, np.where(nodal > 0, nodal, line.weight), nodal + dual),
         coupling=(sp.diags_array(share) @ line.coupling + means).tocsr(),
