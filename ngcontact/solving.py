@@ -112,6 +112,7 @@ def solve(
     NoEquilibriumError
         The load drives a rigid motion that supports and contact do not resist, or hardly.
     """
+    _check_problem(problem)
     usual = 1 if problem.dim == 2 else 2
     order = check_element(usual if order is None else order, element, problem.dim)
     if mesh is not None and maxh is not None:
@@ -154,6 +155,11 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     except (ContactError, ValueError) as error:  # only the first guess depends on it
         log.debug("no coarse run: %s", error)
         return []
+
+
+def _check_problem(problem: object) -> None:
+    if not isinstance(problem, Problem):
+        raise TypeError(f"problem is a {type(problem).__name__}: give a Problem, one at a time")
 
 
 def _check_start(problem: Problem, start: object) -> None:
@@ -313,6 +319,7 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
+    _check_problem(problem)
     if guaranteed or start is not None or order == "auto":
         problem.refuse_solids('adapt with guaranteed=True, start or order="auto"')
     usual = 4 if problem.dim == 2 else 2

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..solved import Solved
-from .files import check_path, replacing
+from .files import check_path, replacing, several
 from .scene import Scene, Style, contact_lines, coordinates, picture, zones_of
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def write_film(
         No solutions, titles of another number, an option that is none, a path that cannot be
         written: before any work.
     """
-    frames, style = list(solutions), Style(**options)
+    frames, style = list(several(solutions)), Style(**options)
     if not frames:
         raise ValueError("solutions: give one at least")
     if titles is not None and len(titles) != len(frames):

@@ -71,6 +71,10 @@ class Style:
                     f'units["{kind}"] = {self.units[kind]}: give a name, or a name and its size in '
                     'the unit of the data, as ("MPa", 1e6)'
                 )
+        if not isinstance(self.profile, Mapping):
+            raise TypeError(
+                f'profile = {self.profile!r}: give a mapping, as {{"Hertz": a function of s}}'
+            )
         for label, profile in self.profile.items():
             if callable(profile):
                 continue

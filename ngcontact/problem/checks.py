@@ -259,8 +259,8 @@ def check_overlaps(view: MeshArrays) -> None:
             what = ("area", "volume")[view.dim - 2]
             raise ValueError(
                 f'body "{name}" of {what} {size[small]:.4g} and body "{beside}" of {what} '
-                f"{size[large]:.4g} lie on top of each other on a {what} of about "
-                f"{share * size[small]:.2g}: cut one out of the other (outer - inner) or draw them "
+                f"{size[large]:.4g} lie on top of each other, about {share * size[small]:.2g} of "
+                f"{what}: cut one out of the other (outer - inner) or draw them "
                 "side by side"
             )
 

@@ -198,6 +198,7 @@ def test_fields_of_a_uniform_stress(uniform, field, value):
         ({"field": ng.CF((1, 2))}, ValueError, "2 components"),
         ({"limits": (2.0, 1.0)}, ValueError, "the smaller first"),
         ({"units": "mm"}, TypeError, "units = 'mm': give a mapping"),
+        ({"profile": np.sqrt}, TypeError, "profile = .* give a mapping"),
         ({"profile": {"a": ("x", "y")}}, TypeError, 'profile\\["a"\\]'),
         ({"units": {"force": "N"}}, ValueError, '"force" is none of'),
         ({"units": {"stress": ("MPa", 0.0)}}, ValueError, "its size"),

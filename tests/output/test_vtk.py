@@ -140,6 +140,8 @@ def test_indicators_are_written_only_if_known(tmp_path):
 
 
 def test_empty_series_is_refused(tmp_path):
+    with pytest.raises(TypeError, match="solutions is a Stub: give a list"):
+        write_series(tmp_path / "run.pvd", stub(1))
     with pytest.raises(ValueError, match="the series is empty"):
         write_series(tmp_path / "run.pvd", [])
     assert list(tmp_path.iterdir()) == []
