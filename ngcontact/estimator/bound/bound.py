@@ -249,15 +249,12 @@ def _proof(
     mu, elements = elements_of(problem, cells, displacement, degree, before)
     # 3. The gap, on guides and on Gamma_K.
     prescribed = prescribed_on_supports(cells, given, displacement)
-    lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
-    for k in np.unique(mu.degree[side]).tolist():
-        own = side[mu.degree[side] == k]
-        lines.append(guide_sides(cells, displacement, own, (k - extent, lift)))
+    side, degrees = np.flatnonzero(np.isin(cells.segment, guided)), (degree - extent, lift)
+    lines = [guide_sides(cells, displacement, side, degrees)] if side.size else []
     holding = [(x.side, x.direction[:, [0, -1]]) for x in prescribed]
     held = held_motions(cells, holding + [(x.side, TO_ENDS @ x.direction) for x in lines])
     moduli = by_triangle(elements, [e.modulus for e in elements])
     for reach in reaches:
-        degrees = degree - extent, lift
         lines.append(facing_sides(cells, displacement, reach, degrees, held, moduli))
     every = np.arange(len(trace.region))
     sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]

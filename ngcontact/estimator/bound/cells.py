@@ -90,8 +90,8 @@ class Cells:
         return MeshArrays(self.trace.mesh).bodies[self.parent]
 
     def on_side(self, side: Index, t: Array) -> tuple[Index, Array]:
-        """Segment (k,) and parameter s (k,) of places `t` (k,) on boundary sides `side` (k,)."""
-        a, b = self.span[side].T
+        """Segments (k,) and parameters s, like `t`, of places `t` (k,) or (k, j) on `side` (k,)."""
+        a, b = self.span[side].T.reshape(2, -1, *[1] * (t.ndim - 1))
         return self.segment[side], a + (b - a) * t
 
     def side_at(self, segment: Index, s: Array) -> Index:
@@ -174,11 +174,10 @@ class Places:
         return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
 
 
-def places(cells: Cells, at: Index, order: int, along: int | None = None) -> Places:
+def places(cells: Cells, at: Index, order: int) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
-    On curved ones in the distance from the apex, and in the parameter of the base, there of the
-    degree `along`, by default the same.
+    On curved ones in the distance from the apex, and in the parameter of the base.
 
     Raises
     ------
@@ -186,9 +185,9 @@ def places(cells: Cells, at: Index, order: int, along: int | None = None) -> Pla
         A curved side goes beyond the middle of its element.
     """
     if len(at) and cells.curved[at[0]]:
-        (g, w), (h, v) = gauss(order), gauss(order if along is None else along)
-        sigma, t = (z.ravel() for z in np.meshgrid(g, h, indexing="ij"))
-        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, v).ravel()
+        g, w = gauss(order)
+        sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
+        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, w).ravel()
     else:
         rule = ng.IntegrationRule(ng.TRIG, order)
         local, weight = np.array(rule.points)[:, :2], np.array(rule.weights)

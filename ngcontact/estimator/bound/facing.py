@@ -53,12 +53,6 @@ def bernstein(degree: int, t: Array) -> Array:
     return np.asarray(comb(degree, i) * t[..., None] ** i * (1 - t[..., None]) ** (degree - i))
 
 
-def on_segments(cells: Cells, side: Index, t: Array) -> tuple[Index, Array]:
-    """Segments (k,) and parameters s (k, j) of places `t` (k, j) or (j,) on sides `side` (k,)."""
-    a, b = cells.span[side].T[..., None]
-    return cells.segment[side], a + (b - a) * t
-
-
 def at_places(function: Callable[[Index, Array], Array], segment: Index, s: Array) -> Array:
     """Values (k, j, ...) of a `function` of n places at `s` (k, j) of segments `segment` (k,)."""
     values = function(np.repeat(segment, s.shape[1]), s.ravel())
@@ -241,7 +235,7 @@ def facing_middles(
     found = [(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp), np.zeros(0))]
     for support in supports:
         side = np.flatnonzero(np.isin(cells.segment, support.segments))
-        place = on_segments(cells, side, np.array([0.5]))
+        place = cells.on_side(side, np.array([[0.5]]))
         there = opposite_points(cells.trace, displacement, support.pair, *place)
         faces = there.segment[:, 0] >= 0
         other = cells.side_at(there.segment[faces, 0], there.s[faces, 0])
@@ -326,7 +320,7 @@ def facing_sides(
     contact, (of_pressure, degree) = line.contact, degrees
     every = np.flatnonzero(np.isin(cells.segment, reach.segments))
     t = np.concatenate([[INSIDE_SIDE], POINTS, [1 - INSIDE_SIDE]])
-    found = opposite_points(trace, displacement, pair, *on_segments(cells, every, t))
+    found = opposite_points(trace, displacement, pair, *cells.on_side(every, t[None]))
     faces = found.faces[:, 1:-1]
     keep = np.asarray(faces.all(axis=1))
     if (found.gap[:, 1:-1][faces & ~keep[:, None]] < 0).any():
@@ -353,7 +347,7 @@ def facing_sides(
                 f'"{contact.primary}" face each other to within {beyond.max():.0e} of a side, as '
                 f"near ({x:.6g}, {y:.6g}): move them together or farther apart, or refine"
             )
-    segment, s = on_segments(cells, side, POINTS)
+    segment, s = cells.on_side(side, POINTS[None])
     ds = at_places(partial(jacobian, trace, contact), segment, s)
     whole = np.append(pair.active, False)[line.rows].all(axis=1)
     number, start, stop = reach.contact.T
@@ -362,22 +356,20 @@ def facing_sides(
         (segment[:, None] == number) & (low >= start - SAME_PLACE) & (high <= stop + SAME_PLACE)
     )
     closed = np.isin(segment, line.segments[whole]) | inside.any(axis=1) | contact.bilateral
-    # Shares: all where only one body can move, and one number at a vertex.
-    d_ends = np.einsum("ej,kjc->kec", TO_ENDS, d)
-    own, opposite = _moves(held[cells.ends[side]], d_ends), np.zeros((len(side), 2), dtype=bool)
-    share = np.ones((len(side), 1))
+    # Shares are as compliances: all where only one body can move, and one number at a vertex.
+    d_ends, opposite = np.einsum("ej,kjc->kec", TO_ENDS, d), np.zeros((len(side), 2))
+    own = _moves(held[cells.ends[side]], d_ends) / moduli[cells.owner[side], None]
     if contact.primary is not None:
         at = (there @ TO_ENDS.T > 0.5).astype(np.intp)
-        opposite = _moves(held[cells.ends[other[:, None], at]], d_ends)
-        stiff, beyond = (moduli[cells.owner[x], None] for x in (side, other))
-        share = beyond / (stiff + beyond)
+        across = held[cells.ends[other[:, None], at]]
+        opposite = _moves(across, d_ends) / moduli[cells.owner[other], None]
     one, narrow = _merged_vertices(cells, side, every[~keep])
-    vertices, most = one[cells.ends[side]], np.zeros(len(one))
-    np.maximum.at(most, vertices, np.where(own == opposite, share, own))
+    vertices, most, total = one[cells.ends[side]], np.zeros(len(one)), own + opposite
+    np.maximum.at(most, vertices, np.divide(own, total, out=0 * own, where=total > 0))
     if contact.bilateral:
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
-        after, lift = _lifted_gap(vertices, gap, closed, ~own & ~opposite, narrow, degree)
+        after, lift = _lifted_gap(vertices, gap, closed, total == 0, narrow, degree)
     return FacingSides(
         pair=pair,
         side=side,
@@ -435,7 +427,7 @@ def guide_sides(
 
     `degrees` are those of q* and of w.
     """
-    trace, (segment, s) = cells.trace, on_segments(cells, side, POINTS)
+    trace, (segment, s) = cells.trace, cells.on_side(side, POINTS[None])
     d = at_places(trace.exact_normal, segment, s)
     gap = -(jump(trace, displacement, (segment, s))[0] * d).sum(axis=2)  # (3.8)
     ds = np.linalg.norm(at_places(trace.derivative, segment, s), axis=2)

@@ -12,7 +12,7 @@ from ...arrays import Array
 from ...fem import model_of
 from .bound import DualProblem, Proof, largest
 from .cells import Cells
-from .facing import POINTS, FacingSides, bernstein, fitted, jump, on_segments, opposite_points
+from .facing import POINTS, FacingSides, bernstein, fitted, jump, opposite_points
 from .lifting import lifted
 from .program import Balanced
 
@@ -112,9 +112,9 @@ def _excess(cells: Cells, G: ng.GridFunction, f: FacingSides, e: Array) -> tuple
     And Bernstein coefficients (k, degree + 1) near to it, one number at a vertex.
     """
     ends = cells.ends[f.side]
-    other, there = on_segments(cells, f.other, f.there)
+    other, there = cells.on_side(f.other, f.there)
     other = np.where(f.other >= 0, other, -1)[:, None].repeat(len(POINTS), 1)
-    values, _ = jump(cells.trace, G, on_segments(cells, f.side, POINTS), (other, there))
+    values, _ = jump(cells.trace, G, cells.on_side(f.side, POINTS[None]), (other, there))
     excess = ((values - e) * f.direction).sum(axis=2)
     excess[np.abs(excess) <= JUMP_NOISE] = 0.0
     c, _ = fitted(excess, f.lifted_gap.shape[1] - 1)
@@ -143,7 +143,7 @@ def _beside(
         return 0.0
     trace, segment = cells.trace, cells.segment
     side = np.setdiff1d(np.flatnonzero(np.isin(segment, f.pair.line.segments)), f.side)
-    place = on_segments(cells, side, POINTS)
+    place = cells.on_side(side, POINTS[None])
     found = opposite_points(trace, displacement, f.pair, *place)
     values, _ = jump(trace, G, place, (found.segment, found.s))
     excess = np.abs(((values - e) * found.direction).sum(axis=2))

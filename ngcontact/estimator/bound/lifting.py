@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
+from functools import lru_cache, partial
 
 import ngsolve as ng
 import numpy as np
@@ -25,7 +24,7 @@ from ...linalg import cholesky, lower_half
 from ...problem import Problem
 from .cells import Cells, places
 from .elements import BATCH_ENTRIES, BodyData
-from .facing import DATA_DEGREE, POINTS, TO_LOBATTO, FacingSides
+from .facing import DATA_DEGREE, POINTS, TO_LOBATTO, FacingSides, at_places
 from .polynomials import CORNERS, DERIVATIVES, derivatives
 from .tractions import BoundaryData
 
@@ -54,30 +53,13 @@ def prescribed_on_supports(
     along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
     found.append(Prescribed(axis, along, np.zeros((len(axis), j))))
     for values, side in given.supports:
-        k = len(side)
-        segment, s = cells.on_side(np.repeat(side, j), np.tile(gauss_lobatto(DATA_DEGREE), k))
-        u = trace.evaluate(displacement, segment, s)
+        place = cells.on_side(side, gauss_lobatto(DATA_DEGREE)[None])
+        u = at_places(partial(trace.evaluate, displacement), *place)
         for c, value in enumerate(values):
             if value is not None:
-                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]  # (3.6)
-                d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
-                found.append(Prescribed(side, d, rest.reshape(k, j)))
-    return found
-
-
-def prescribed_on_line(facing: FacingSides, r: Array, alone: bool) -> list[Prescribed]:
-    """Values of d.w that open the gap of a line by `r` (k, j), lengths at Gauss points.
-
-    Both bodies take their shares of -r and r, or the secondary all `alone`.
-    """
-    start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
-    share = start + (stop - start) * POINTS
-    d = np.einsum("ij,kjc->kic", TO_LOBATTO, facing.direction)
-    found = [Prescribed(facing.side, d, -(share * r) @ TO_LOBATTO.T)]
-    if (share < 1).any():
-        both = np.concatenate([facing.direction, ((1 - share) * r)[..., None]], axis=2)
-        there = TO_LOBATTO @ facing.on_primary(both)
-        found.append(Prescribed(facing.other, there[..., :2], there[..., 2]))
+                fixed = at_places(partial(trace.evaluate, ng.CF(value)), *place)[..., 0]
+                d = np.broadcast_to(np.eye(2)[c], u.shape)
+                found.append(Prescribed(side, d, fixed - u[..., c]))  # (3.6)
     return found
 
 
@@ -89,25 +71,23 @@ def lifted(
     degree: int,
     extent: float,
 ) -> Array:
-    """Norms (n,) of w, roots of energies per thickness, which both bodies of each line share.
+    """Norms (n,) of w, roots of energies per thickness, which opens the gaps of lines by r.
 
-    If conditions at a vertex disagree, only secondaries move. `prescribed` are the conditions on
-    supports, `lines` (k, j) the facing sides with r, lengths at Gauss points; the rest is as of
-    `lifting_of`.
-
-    Raises
-    ------
-    ContactError
-        Conditions disagree on secondaries alone, too.
+    Both bodies take their shares of -r and r. `prescribed` are the conditions on supports, `lines`
+    (k, j) the facing sides with r, lengths at Gauss points; the rest is as of `lifting_of`.
     """
-    away = np.concatenate([np.zeros(0, dtype=np.intp), *(facing.slots for facing, _ in lines)])
-    for alone in (False, True):
-        every = [*prescribed, *(one for line in lines for one in prescribed_on_line(*line, alone))]
-        try:
-            return lifting_of(problem, cells, every, degree, extent, away)
-        except ContactError as found:
-            error = found
-    raise error
+    every = list(prescribed)
+    for line, r in lines:
+        start, stop = line.share.T[:, :, None]
+        share = start + (stop - start) * POINTS
+        d = np.einsum("ij,kjc->kic", TO_LOBATTO, line.direction)
+        every.append(Prescribed(line.side, d, -(share * r) @ TO_LOBATTO.T))
+        if (share < 1).any():
+            both = np.concatenate([line.direction, ((1 - share) * r)[..., None]], axis=2)
+            there = TO_LOBATTO @ line.on_primary(both)
+            every.append(Prescribed(line.other, there[..., :2], there[..., 2]))
+    away = [side for line, _ in lines for side in line.slots]
+    return lifting_of(problem, cells, every, degree, extent, away)
 
 
 def lifting_of(
@@ -116,7 +96,7 @@ def lifting_of(
     prescribed: Sequence[Prescribed],
     degree: int,
     extent: float,
-    away: Sequence[int] | Index = (),
+    away: Sequence[int] = (),
 ) -> Array:
     """Norms (n,) of w with all that is `prescribed`, of a `degree`, or more on sides that need it.
 
@@ -152,7 +132,7 @@ def lifting_of(
             asked[(np.abs(both - lower @ both) <= AMOUNT_ERROR).all(axis=(1, 2))] = n
         degrees[one.side] = np.maximum(degrees[one.side], asked)
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
-    nodes = np.unique(np.concatenate([part.nodes.ravel() for part in stiffness]))
+    nodes = np.unique(np.concatenate([own.ravel() for _, own, _ in stiffness]))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     conditions = []
     for one in prescribed:
@@ -177,11 +157,11 @@ def lifting_of(
         raise ContactError("conditions that meet at a vertex require different displacements")
     rim = _on_sides(cells, np.flatnonzero((count == 1) & fixed), degree)
     held[np.searchsorted(nodes, rim)] = True
-    dofs = [2 * np.searchsorted(nodes, part.nodes) for part in stiffness]
-    dofs = [np.concatenate([x, x + 1], axis=1) for x in dofs]
+    first = [2 * np.searchsorted(nodes, own) for _, own, _ in stiffness]
+    dofs = [np.concatenate([x, x + 1], axis=1) for x in first]
     if not held.all():
         K = from_triplets(
-            np.concatenate([part.K.ravel() for part in stiffness]),
+            np.concatenate([part.ravel() for *_, part in stiffness]),
             np.concatenate([np.repeat(x, x.shape[1], axis=1).ravel() for x in dofs]),
             np.concatenate([np.tile(x, (1, x.shape[1])).ravel() for x in dofs]),
             (w.size, w.size),
@@ -192,12 +172,12 @@ def lifting_of(
         y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
         w += (Z @ y).reshape(-1, 2)
     still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
-    for part, x in zip(stiffness, dofs, strict=True):
+    for (at, _, part), x in zip(stiffness, dofs, strict=True):
         own = w.ravel()[x].reshape(len(x), 2, -1)
         own[:, still:] -= own[:, still:, :1]
         own = own.reshape(x.shape)
-        square = ((part.K @ own[..., None])[..., 0] * own).sum(axis=1)
-        norms[part.at] = np.sqrt(np.maximum(square, 0.0))
+        square = ((part @ own[..., None])[..., 0] * own).sum(axis=1)
+        norms[at] = np.sqrt(np.maximum(square, 0.0))
     return norms
 
 
@@ -207,18 +187,13 @@ def _on_sides(cells: Cells, side: Index, n: int) -> Index:
     return np.concatenate([cells.ends[side, :1], inner, cells.ends[side, 1:]], axis=1)
 
 
-class Stiffness(NamedTuple):
-    """Stiffness of b triangles with m nodes each; x components come first."""
-
-    at: Index  # (b,) the triangles
-    nodes: Index  # (b, m)
-    K: Array  # (b, 2 m, 2 m)
-
-
 def _stiffness(
     problem: Problem, cells: Cells, layer: Index, degrees: Index, degree: int
-) -> Iterator[Stiffness]:
-    """Triangles of a `layer` (k,), polynomials of a `degree`, on the sides of `degrees` (e,)."""
+) -> Iterator[tuple[Index, Index, Array]]:
+    """Stiffness of triangles of a `layer` (k,) at a time: these (b,), nodes (b, m), (b, 2 m, 2 m).
+
+    For polynomials of a `degree`, on the sides of `degrees` (e,); x components come first.
+    """
     data = BodyData.of(problem, cells.trace.mesh)
     varying = data.law_varies[cells.bodies]
     key = np.column_stack([degrees[cells.sides], cells.curved, varying])[layer]
@@ -246,7 +221,7 @@ def _stiffness(
             first = len(cells.vertices) + (DATA_DEGREE - 1) * len(cells.ends)
             rest = first + inside * at[:, None] + np.arange(inside)
             number = np.hstack([cells.triangles[at], *on, rest])
-            yield Stiffness(at, number, strain.transpose(0, 2, 1) @ stress)
+            yield at, number, strain.transpose(0, 2, 1) @ stress
 
 
 @lru_cache

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
@@ -109,6 +110,7 @@ def divided(
     for e in parts[1]:
         np.minimum.at(moduli, parent[e.places.at], e.modulus)
         np.maximum.at(degree, parent[e.places.at], e.degree)
+    force = cells.trace.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
     while True:
         order = np.argsort(D)
         marked = np.zeros(len(D), dtype=bool)
@@ -118,16 +120,10 @@ def divided(
             return cells
         cells, whole = bisected(cells, marked, linked)
         missed, new = np.zeros(len(whole)), np.flatnonzero(np.bincount(whole)[whole] > 1)
-        for pattern, force in problem.force.items():
-            if numbers(force):
-                continue
-            body = np.array(cells.trace.mesh.Materials(pattern).Mask())[cells.bodies[new]]
-            key = 2 * degree[cells.parent[new]] + cells.curved[new]
-            for kind in np.unique(key[body]):
-                at = new[body & (key == kind)]
-                points = places(cells, at, 2 * (kind // 2) + 4)
-                n = kind // 2 - 1 - cells.trace.model.extent
-                missed[at] = projection(force, cells, points, n)[1]
+        key = 2 * degree[cells.parent[new]] + cells.curved[new]
+        for kind in () if all(map(numbers, problem.force.values())) else np.unique(key):
+            at, n = new[key == kind], kind // 2 - 1 - cells.trace.model.extent
+            missed[at] = projection(force, cells, places(cells, at, 2 * (kind // 2) + 4), n)[1]
         given, P = boundary_data(problem, cells), traces(int(degree.min()), POINTS)
         near = P @ ((P.T * WEIGHTS) @ given.loads)
         sides = given.missed(near, (), (), float(np.abs(near).max(initial=0.0)))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -187,7 +187,7 @@ def dual_program(
     R, T = _basis(mu, lines, unknown)
     m, dofs = len(unknown), [e.dofs.astype(np.int32) for e in elements]  # half of the memory
     squares = [e.N.transpose(0, 2, 1) @ e.N for e in elements]
-    K = _summed([Block(at, at, x) for at, x in zip(dofs, squares, strict=True)], (d, d))
+    K = _summed([(at, at, x) for at, x in zip(dofs, squares, strict=True)], (d, d))
     if m:
         K = K + change_of_basis(K, T)
     size = K.diagonal()
@@ -231,14 +231,13 @@ def _basis(
             R = (load[some] @ traces(degree, POINTS)).reshape(*row[some].shape, -1)
             at, rest = mu.of(line.side[some])[0], np.linalg.svd(R)[2][:, R.shape[1] :]
             plain[at] = False
-            own.append(Block(row[some], at, R))
-            solved.append(Block(at, at, np.linalg.inv(np.concatenate([R, rest], axis=1))))
+            own.append((row[some], at, R))
+            solved.append((at, at, np.linalg.inv(np.concatenate([R, rest], axis=1))))
         some = np.flatnonzero(line.other >= 0)
         at, there = mu.of(line.other[some])
         R = -(load[some] @ traces(at.shape[1] // 2 - 1, line.there[some])[:, None])
-        across.append(
-            Block(row[some], at, R.reshape(*row[some].shape, at.shape[1]) * there[:, None])
-        )
+        R = R.reshape(*row[some].shape, at.shape[1]) * there[:, None]
+        across.append((row[some], at, R))
     part = _summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
     R = _summed(across, (m, d))
     M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary
@@ -247,16 +246,10 @@ def _basis(
     return _summed(own, (m, d)) + R, T
 
 
-class Block(NamedTuple):
-    """Dense block (..., r, c), or several of one shape, in a sparse array."""
-
-    rows: np.ndarray  # (..., r)
-    columns: np.ndarray  # (..., c)
-    values: Array  # (..., r, c)
-
-
-def _summed(blocks: Sequence[Block], shape: tuple[int, int]) -> sp.csr_array:
-    """Sparse sum of blocks."""
-    row = _joined([np.repeat(x.rows, x.columns.shape[-1], axis=-1) for x in blocks], np.int32)
-    column = _joined([np.tile(x.columns, x.rows.shape[-1]) for x in blocks], np.int32)
-    return from_triplets(_joined([x.values for x in blocks]), row, column, shape)
+def _summed(
+    blocks: Sequence[tuple[np.ndarray, np.ndarray, Array]], shape: tuple[int, int]
+) -> sp.csr_array:
+    """Sparse sum of dense blocks: of each, or of several of one shape, rows, columns and values."""
+    row = _joined([np.repeat(i, j.shape[-1], axis=-1) for i, j, _ in blocks], np.int32)
+    column = _joined([np.tile(j, i.shape[-1]) for i, j, _ in blocks], np.int32)
+    return from_triplets(_joined([values for *_, values in blocks]), row, column, shape)

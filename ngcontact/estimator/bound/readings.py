@@ -51,16 +51,16 @@ class ContactPressure:
 
         At the end of two parts the one towards the middle of the segment.
         """
-        low, high = np.sort(self.span, axis=1).T
-        order, inside = np.argsort(self.segments + low), np.clip(s, INSIDE_PART, 1 - INSIDE_PART)
-        start = np.append(-np.inf, (self.segments + low)[order])
-        part = np.append(-1, order)[np.searchsorted(start, segment + inside, side="right") - 1]
-        on = (part >= 0) & (np.append(self.segments, -1)[part] == segment)
-        on &= inside <= np.append(high, 0.0)[part]
-        part, found = part[on], np.zeros(len(segment))
+        found, inside = np.zeros(len(segment)), np.clip(s, INSIDE_PART, 1 - INSIDE_PART)
+        if not len(self.segments):
+            return found
+        order = np.argsort(self.segments + self.span.min(axis=1))
+        start = (self.segments + self.span.min(axis=1))[order]
+        part = order[np.searchsorted(start, segment + inside, side="right") - 1]
         a, b = self.span[part].T
-        basis = bernstein(self.coefficients.shape[1] - 1, (s[on] - a) / (b - a))
-        found[on] = (basis * self.coefficients[part]).sum(axis=1)
+        on = (self.segments[part] == segment) & ((inside - a) * (inside - b) <= 0)
+        basis = bernstein(self.coefficients.shape[1] - 1, ((s - a) / (b - a))[on])
+        found[on] = (basis * self.coefficients[part[on]]).sum(axis=1)
         return found
 
 
@@ -176,16 +176,12 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     ValueError
         Where cells have curved sides, or normals of drawn curves turn along straight ones.
     """
-    cells, mu, lines, stress = (
-        proof.dual.cells,
-        proof.dual.program.multipliers,
-        proof.dual.program.lines,
-        proof.stress,
-    )
-    turns = [np.ptp(f.direction, axis=1).max(axis=1) > SAME_DIRECTION for f in lines]
-    turning = sum(int(x.sum()) for x in turns)
-    found = {"cells have a curved side": int(cells.curved.sum())}
-    found["sides have a direction of contact or guide that turns along them"] = turning
+    cells, lines, stress = proof.dual.cells, proof.dual.program.lines, proof.stress
+    turns = _joined([np.ptp(f.direction, axis=1).max(axis=1) > SAME_DIRECTION for f in lines])
+    found = {
+        "cells have a curved side": cells.curved.sum(),
+        "sides have a direction of contact or guide that turns along them": int(turns.sum()),
+    }
     if any(found.values()):
         reasons = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {reasons}; tractions and p* are no polynomials there")
@@ -221,7 +217,8 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         }
     # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
     side = np.flatnonzero(~cells.inner)
-    traction = proof.dual.moments[mu.of(side)[0]].reshape(len(side), 2, -1)
+    numbers, _ = proof.dual.program.multipliers.of(side)
+    traction = proof.dual.moments[numbers].reshape(len(side), 2, -1)
     position = np.full(len(cells.ends) + 1, -1)  # the last one where no side is faced
     position[side] = np.arange(len(side))
     return arrays | {

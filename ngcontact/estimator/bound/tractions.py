@@ -15,7 +15,7 @@ from ...problem import Problem
 from ...quadrature import loads_of
 from .cells import Cells
 from .elements import Multipliers, Stress, traces
-from .facing import DATA_DEGREE, POINTS, WEIGHTS, FacingSides, jump, on_segments
+from .facing import DATA_DEGREE, POINTS, WEIGHTS, FacingSides, jump
 
 FINEST_PARTS = 16  # of a side of an element: cells do not become smaller
 LEAST_PART = 0.25  # of a segment, between vertices beside rough places
@@ -133,6 +133,6 @@ def boundary_data(problem: Problem, cells: Cells) -> BoundaryData:
     loads = np.zeros(x.shape)
     for name in problem.traction:
         at, load = np.searchsorted(side, sides(name)), problem.traction_vector(name)
-        loads[at] += jump(cells.trace, load, on_segments(cells, side[at], POINTS))[0]
+        loads[at] += jump(cells.trace, load, cells.on_side(side[at], POINTS[None]))[0]
     weight = WEIGHTS * length * measure
     return BoundaryData(cells, supports, held, side, weight, measure, x, normal, loads)
