@@ -8,10 +8,11 @@ import numpy as np
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
+from ngcontact import Contact, Elastic, Problem
 from ngcontact.adaptivity import refined
 from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks
+from ngcontact.geometries import ball_on_block, blocks, cube_on_block
 from ngcontact.geometries.region import body, polygon
 from ngcontact.lagrange import gauss, lagrange
 from ngcontact.linalg import coarsenings
@@ -43,9 +44,34 @@ def unmatched_blocks():
 
 
 def rectangle(name, x, y, sides):
-    """Body between x[0] and x[1], y[0] and y[1]; names of its bottom, right, top and left."""
+    """Body between x[0] and x[1], y[0] and y[1]; names of bottom, right, top and left, or one."""
     (a, b), (c, d) = x, y
-    return body(name, polygon([(a, c), (b, c), (b, d), (a, d)], sides))
+    names = [sides] * 4 if isinstance(sides, str) else sides
+    return body(name, polygon([(a, c), (b, c), (b, d), (a, d)], names))
+
+
+def pressed_cube(**changes):
+    """A cube under the pressure .1 on a block that is as wide."""
+    data = {
+        "geometry": cube_on_block(width=1.0),
+        "materials": {"cube": Elastic(E=1.0, nu=0.3), "block": Elastic(E=3.0, nu=0.2)},
+        "displacement": {"block_bottom": (0, 0, 0)},
+        "traction": {"cube_top": 0.1},
+        "contact": [Contact("cube_bottom", "block_top", direction=(0, 0, -1))],
+    }
+    return Problem(**(data | changes))
+
+
+def pressed_ball(depth, **changes):
+    """A quarter of a ball of radius 1, pressed into a block."""
+    data = {
+        "geometry": ball_on_block(width=1.0, height=1.0),
+        "materials": {"ball": Elastic(E=1.0, nu=0.3), "block": Elastic(E=3.0, nu=0.2)},
+        "displacement": {"block_bottom": (0, 0, 0), "ball_top": (0, 0, -depth)},
+        "sliding": "cut_x|cut_y",
+        "contact": [Contact("ball_surface", "block_top", direction=(0, 0, -1))],
+    }
+    return Problem(**(data | changes))
 
 
 def coordinates(mesh):

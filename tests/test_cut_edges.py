@@ -5,24 +5,18 @@ from types import SimpleNamespace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane, X, Y
+from netgen.occ import Compound, OCCGeometry, WorkPlane, X
 
 from drivers.reference.straight import energy_error
 from drivers.stress.motion import Motion, moved_mesh
 from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
+from tests.scenes import rectangle
 
 ORDERS = (1, 2, 3, 4)
 BORE, RIM, PRESSURE = 3.0, 5.0, 100.0
 STEEL = Elastic(E=2e5, nu=0.3)
 GUIDES = {"quarter": "left|below", "half": "left", "whole": None}
-
-
-def rectangle(x, y, width, height, name, edges):
-    """Face with all its edges of one name."""
-    face = WorkPlane().MoveTo(x, y).Rectangle(width, height).Face()
-    face.faces.name, face.edges.name = name, edges
-    return face
 
 
 def disc(radius, name, edge):
@@ -36,9 +30,7 @@ def tube(part):
     shape = disc(RIM, "tube", "rim") - disc(BORE, "tube", "bore")
     if part != "whole":
         low = 0 if part == "quarter" else -6
-        window = rectangle(0, low, 6, 6 - low, "tube", "cut")
-        window.edges.Min(X).name = "left"
-        window.edges.Min(Y).name = "below"
+        window = rectangle("tube", (0, 6), (low, 6), ("below", "cut", "cut", "left"))
         shape = shape * window
     return OCCGeometry(shape, dim=2)
 
@@ -94,12 +86,16 @@ def test_segments_of_a_given_mesh_may_run_either_way(order):
         assert other.reactions[name] == pytest.approx(reaction, abs=1e-12 * PRESSURE * BORE)
 
 
+def plate(below="side"):
+    return rectangle("body", (0, 4), (0, 3), (below, "side", "side", "side"))
+
+
 def l_shape():
-    return rectangle(0, 0, 4, 3, "body", "side") - rectangle(2, 1, 2.5, 2.5, "hole", "loaded")
+    return plate() - rectangle("hole", (2, 4.5), (1, 3.5), "loaded")
 
 
 def cut_twice():
-    body = rectangle(0, 0, 4, 3, "body", "side") - rectangle(1, 1, 1, 1, "hole", "loaded")
+    body = plate() - rectangle("hole", (1, 2), (1, 2), "loaded")
     return body - WorkPlane().MoveTo(2, 1.5).Circle(0.7).Face()
 
 
@@ -135,8 +131,7 @@ def test_a_cut_that_takes_nothing_away_is_told():
             pen.LineTo(*corner)
         notch = pen.Face()
         notch.edges.name = "flank"
-        shape = rectangle(0, 0, 4, 3, "body", "side") - notch
-        shape.edges.Min(Y).name = "below"
+        shape = plate("below") - notch
         problem = Problem(
             OCCGeometry(shape, dim=2), {"body": STEEL}, {"below": (0, 0)}, traction={"flank": 1.0}
         )
@@ -153,8 +148,8 @@ def test_a_cut_that_takes_nothing_away_is_told():
 def test_overlaps_are_found_on_fine_meshes(width, shift):
     """By a sample: 70 or 80 % of a body, or all of it, on a square of 4000 triangles."""
     both = [
-        rectangle(0, 0, 1, 1, "square", "side"),
-        rectangle(shift, 0.3, width, 0.4, "bar", "end"),
+        rectangle("square", (0, 1), (0, 1), "side"),
+        rectangle("bar", (shift, shift + width), (0.3, 0.7), "end"),
     ]
     for shapes in (both, both[::-1]):
         geometry = OCCGeometry(Compound(shapes), dim=2)

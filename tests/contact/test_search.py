@@ -6,12 +6,14 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.csg import unit_cube
-from netgen.occ import Circle, Compound, Glue, MoveTo, OCCGeometry, X, Y
+from netgen.occ import Circle, Compound, Glue, OCCGeometry
 
 from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic, Problem, find_contacts, solve
 from ngcontact import geometries as gallery
+from ngcontact.geometries.region import compound
 from ngcontact.mesh import first_mesh
+from tests.scenes import rectangle
 
 
 def sides(found):
@@ -47,13 +49,12 @@ def test_the_gallery_s_pairs(geometry, within, expected):
 @pytest.mark.parametrize("within", [0.6, 1.1, 10.0])
 def test_nothing_is_found_through_a_body(within):
     """Behind a body, seen from its far side, another one is no partner, whatever `within` is."""
-    bodies = []
-    for name, y in (("lower", 0.0), ("upper", 0.5)):
-        face = MoveTo(0, y).Rectangle(1, 0.5).Face()
-        face.name, face.edges.name = name, f"{name}_side"
-        face.edges.Min(Y).name, face.edges.Max(Y).name = f"{name}_bottom", f"{name}_top"
-        bodies.append(face)
-    found = find_contacts(OCCGeometry(Compound(bodies), dim=2), within=within)
+    names = ("bottom", "side", "top", "side")
+    bodies = (
+        rectangle(body, (0, 1), y, [f"{body}_{side}" for side in names])
+        for body, y in (("lower", (0.0, 0.5)), ("upper", (0.5, 1.0)))
+    )
+    found = find_contacts(compound(*bodies), within=within)
     assert sides(found) == [("lower_top", "upper_bottom")]
 
 
@@ -108,11 +109,8 @@ def test_lengths_that_are_refused(within, error, no_work):
 def test_nothing_near_enough_is_a_warning():
     with pytest.warns(ContactWarning, match=r'within 1e-05; "arc\d" is 0.001.* apart from "arc\d"'):
         assert find_contacts(row_of_discs(1e-3), within=1e-5) == []
-    one = MoveTo(0, 0).Rectangle(1, 1).Face()
-    one.name, one.edges.name = "one", "rim"
-    other = MoveTo(1, 0).Rectangle(1, 1).Face()
-    other.name, other.edges.name = "other", "edge"
-    other.edges.Min(X).name = "side"
+    one = rectangle("one", (0, 1), (0, 1), "rim")
+    other = rectangle("other", (1, 2), (0, 1), ("edge", "edge", "edge", "side"))
     glued = OCCGeometry(Glue([one, other]), dim=2)
     with pytest.warns(ContactWarning, match="join them by Compound, not Glue"):
         assert find_contacts(glued, within=1.0) == []

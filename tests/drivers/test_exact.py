@@ -7,14 +7,15 @@ from types import SimpleNamespace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference.curved import curved, rings
 from drivers.reference.manufactured import equilibrated, slits
 from drivers.reference.straight import hertz, patch, relative_energy_error, transition
 from drivers.reference.westergaard import effective_modulus
+from ngcontact.geometries.region import compound
 from ngcontact.problem.material import Elastic
+from tests.scenes import rectangle
 
 UPPER, LOWER = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
 MATERIALS = {"upper": UPPER, "lower": LOWER, "outer": UPPER, "inner": LOWER}
@@ -64,12 +65,8 @@ def at(field, box, x, y):
 
 def two_blocks(maxh):
     """Mesh of the blocks (-1, 1) x (0, 1), "upper", and (-1, 1) x (-1, 0), "lower"."""
-    blocks = []
-    for body, y0 in (("upper", 0), ("lower", -1)):
-        block = WorkPlane().MoveTo(-1, y0).Rectangle(2, 1).Face()
-        block.faces.name = body
-        blocks.append(block)
-    return ng.Mesh(OCCGeometry(Compound(blocks), dim=2).GenerateMesh(maxh=maxh))
+    blocks = (rectangle(name, box[:2], box[2:], "side") for name, box in HALVES.items())
+    return ng.Mesh(compound(*blocks).GenerateMesh(maxh=maxh))
 
 
 def discrete(mesh, stress, order=2):

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import pyvista
 
-from ngcontact import Contact, Elastic, Problem, solve, write_series
-from ngcontact.geometries import ball_on_block, cube_on_block, shells
+from ngcontact import Elastic, solve, write_series
+from ngcontact.geometries import shells
 from ngcontact.output.nodes import nodes_of
 from ngcontact.output.surface import contact_surface
+from tests import scenes
 
 PRESSURE = 0.1
 
@@ -18,26 +19,14 @@ PRESSURE = 0.1
 @lru_cache
 def pressed_cube(order):
     """A column under uniform pressure: stress zz alone, as nu = 0; contact everywhere."""
-    problem = Problem(
-        geometry=cube_on_block(width=1.0),
-        materials={"cube|block": Elastic(E=1.0, nu=0.0)},
-        displacement={"block_bottom": (0, 0, 0)},
-        traction={"cube_top": PRESSURE},
-        contact=[Contact("cube_bottom", "block_top", direction=(0, 0, -1))],
-    )
+    law = {"cube|block": Elastic(E=1.0, nu=0.0)}
+    problem = scenes.pressed_cube(materials=law, traction={"cube_top": PRESSURE})
     return solve(problem, maxh=0.7, order=order)
 
 
 @lru_cache
 def pressed_ball(order=2):
-    problem = Problem(
-        geometry=ball_on_block(width=1.0, height=1.0),
-        materials={"ball": Elastic(E=1.0, nu=0.3), "block": Elastic(E=3.0, nu=0.2)},
-        displacement={"block_bottom": (0, 0, 0), "ball_top": (0, 0, -0.1)},
-        sliding="cut_x|cut_y",
-        contact=[Contact("ball_surface", "block_top", direction=(0, 0, -1))],
-    )
-    return solve(problem, maxh=0.4, order=order)
+    return solve(scenes.pressed_ball(0.1), maxh=0.4, order=order)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -125,10 +114,7 @@ def test_a_series_of_levels(tmp_path):
 
 
 def test_nothing_in_contact_is_an_empty_file(tmp_path):
-    problem = Problem(
-        geometry=cube_on_block(width=1.0),
-        materials={"cube|block": Elastic(E=1.0, nu=0.3)},
-        displacement={"block_bottom|cube_top": (0, 0, 0)},
-    )
+    held = {"block_bottom|cube_top": (0, 0, 0)}
+    problem = scenes.pressed_cube(displacement=held, traction={}, contact=[])
     solve(problem, maxh=1.0, order=1).write(tmp_path / "free.vtu")
     assert pyvista.read(tmp_path / "free_contact.vtp").n_points == 0

@@ -11,10 +11,11 @@ from netgen.occ import Axis, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import ball_on_block, blocks, cube_on_block, disc_on_disc, rings
+from ngcontact.geometries import blocks, disc_on_disc, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.plausibility import refinement_warning
 from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error
+from tests.scenes import pressed_ball, pressed_cube
 
 SOFT = Elastic(E=1.0, nu=0.3)
 DOWN = (0, -1)
@@ -238,39 +239,27 @@ def test_a_gap_of_the_other_sign_than_the_drawing_is_told(interference, gap):
     assert only(lambda: solve(pressed_ring(interference, gap), maxh=0.3, order=2), *parts)
 
 
-def pressed_cube(direction=(0, 0, -1), gap=None):
-    """A cube pressed down on a block that is as wide."""
-    return Problem(
-        geometry=cube_on_block(width=1.0),
-        materials={"cube|block": Elastic(E=1.0, nu=0.3)},
+def lowered_cube(direction=(0, 0, -1), gap=None):
+    """A cube pressed down on a block by its top's displacement."""
+    return pressed_cube(
         displacement={"block_bottom": (0, 0, 0), "cube_top": (0, 0, -1e-3)},
+        traction={},
         contact=[Contact("cube_bottom", "block_top", direction=direction, gap=gap)],
     )
 
 
 def test_solids_are_told_of_directions_gaps_and_strains():
     slope = math.radians(30)
-    inclined = pressed_cube((math.sin(slope), 0, -math.cos(slope)))
+    inclined = lowered_cube((math.sin(slope), 0, -math.cos(slope)))
     for problem, *parts in (
         (inclined, DIRECTION, "30 degrees", "direction=(0.5, 0, -0.866)"),
-        (pressed_cube(gap=-3.0), STRAIN, "sign of gap"),
+        (lowered_cube(gap=-3.0), STRAIN, "sign of gap"),
     ):
         assert only(lambda problem=problem: solve(problem, maxh=0.7, order=1), *parts)
-    assert quiet(lambda: solve(pressed_cube(), maxh=0.7, order=1))
+    assert quiet(lambda: solve(lowered_cube(), maxh=0.7, order=1))
 
 
 THROUGH, SMALL_ZONE = "pass through each other", "is not resolved, by 1 of at least 4 nodes"
-
-
-def pressed_ball(press):
-    """A quarter of a ball of radius 1, pressed into a block."""
-    return Problem(
-        geometry=ball_on_block(width=1.0, height=1.0),
-        materials={"ball|block": SOFT},
-        displacement={"block_bottom": (0, 0, 0), "ball_top": (0, 0, -press)},
-        sliding="cut_x|cut_y",
-        contact=[Contact("ball_surface", "block_top", direction=(0, 0, -1))],
-    )
 
 
 def test_solids_are_told_of_penetration_where_no_row_stands():
@@ -300,7 +289,7 @@ def test_loads_that_bring_nothing_into_contact_are_told(solids):
 
 
 def test_estimates_of_solids_that_rise_are_told_with_their_place():
-    mesh = solve(pressed_cube(), maxh=0.7, order=1).mesh
+    mesh = solve(lowered_cube(), maxh=0.7, order=1).mesh
     message = refinement_warning(mesh, np.arange(1.0, mesh.ne + 1), [1e-2, 2e-2, 3e-2])
     place = message[message.index("near (") + 6 : message.index(") in body")].split(", ")
     corners = [mesh[v].point for v in mesh[ng.ElementId(ng.VOL, mesh.ne - 1)].vertices]

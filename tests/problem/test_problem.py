@@ -7,7 +7,7 @@ import netgen.meshing
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Box, Compound, Glue, MoveTo, OCCGeometry, Pnt, WorkPlane, X, Y
+from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks
@@ -16,24 +16,18 @@ from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
 from ngcontact.problem.values import body_mask, boundary_mask
+from tests.scenes import rectangle
 
 STEEL = Elastic(E=210e9, nu=0.3)
 NAN = ng.sqrt(-1 - ng.x * ng.x)  # not a number at every point
 TOUCH = Contact("punch_bottom", "block_top", direction=(0, -1))
 
 
-def block(name, y, bottom, top):
-    face = WorkPlane().MoveTo(0, y).Rectangle(2, 1).Face()
-    face.faces.name = name
-    face.edges.Min(X).name = "left"
-    face.edges.Max(X).name = "right"
-    face.edges.Min(Y).name = bottom
-    face.edges.Max(Y).name = top
-    return face
-
-
 def shapes():
-    return [block("block", 0, "bottom", "block_top"), block("punch", 1, "punch_bottom", "top")]
+    return [
+        rectangle("block", (0, 2), (0, 1), ("bottom", "right", "block_top", "left")),
+        rectangle("punch", (0, 2), (1, 2), ("punch_bottom", "right", "top", "left")),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +88,7 @@ def test_problem_normalises(make, mesh):
         name: tuple(None if part is None else part(at) for part in pair)
         for name, pair in problem.displacement.items()
     }
-    assert values == {"bottom": (0, None), "left": (0.25, 2), "top": (None, 3)}
+    assert values == {"bottom": (0, None), "left": pytest.approx((0.25, 2)), "top": (None, 3)}
     assert problem.sliding == "right|axis"
     assert [load.dim for load in problem.traction.values()] == [1, 2, 2, 1]
     assert problem.traction["b"](at) == (1, 0.5)
@@ -320,10 +314,8 @@ def test_data_of_numbers_alone_are_told_from_functions():
 
 
 def test_a_traction_between_glued_bodies_is_refused():
-    lower, upper = (MoveTo(0, y).Rectangle(1, 1).Face() for y in (0, 1))
-    for face, name in ((lower, "lower"), (upper, "upper")):
-        face.name, face.edges.name = name, "side"
-    lower.edges.Max(Y).name = upper.edges.Min(Y).name = "between"
+    lower = rectangle("lower", (0, 1), (0, 1), ("side", "side", "between", "side"))
+    upper = rectangle("upper", (0, 1), (1, 2), ("between", "side", "side", "side"))
     glued = Problem(
         OCCGeometry(Glue([lower, upper]), dim=2),
         {".*": Elastic(E=1.0, nu=0.3)},

@@ -7,25 +7,18 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import OCCGeometry, Rectangle, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import ContactWarning, Elastic, Problem, solve
 from ngcontact.fem.space import LOAD_BONUS, load_vector
+from ngcontact.geometries.region import compound
 from ngcontact.quadrature import SampledElements, rough_load
-
-
-def square():
-    face = Rectangle(1, 1).Face()
-    face.faces.name = "body"
-    face.edges.Max(Y).name, face.edges.Min(Y).name = "top", "bottom"
-    face.edges.Min(X).name, face.edges.Max(X).name = "left", "right"
-    return OCCGeometry(face, dim=2)
+from tests.scenes import rectangle
 
 
 def loaded(**data):
     return Problem(
-        geometry=square(),
+        geometry=compound(rectangle("body", (0, 1), (0, 1), ("bottom", "right", "top", "left"))),
         materials={"body": Elastic(1.0, 0.3)},
         displacement={"bottom": (0, 0)},
         **data,

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import cube_on_block, disc, shells
+from ngcontact import Elastic, Problem, solve
+from ngcontact.geometries import disc, shells
+from tests.scenes import pressed_cube
 
 EXACT = 1e-10  # identities of affine and quadratic fields; measured 1e-13 and less
 STRAIN = np.array([[2e-3, 1e-3], [-4e-4, -3e-3]])
@@ -44,16 +45,6 @@ def stretched_shells(order):
         geometry=shells(interference=0.01), materials=law, displacement=dict.fromkeys(names, affine)
     )
     return solve(problem, maxh=0.6, order=order)
-
-
-def pressed_cube():
-    return Problem(
-        geometry=cube_on_block(width=1.0),
-        materials={"cube": Elastic(E=1.0, nu=0.3), "block": Elastic(E=3.0, nu=0.2)},
-        displacement={"block_bottom": (0, 0, 0)},
-        traction={"cube_top": 0.1},
-        contact=[Contact("cube_bottom", "block_top", direction=(0, 0, -1))],
-    )
 
 
 @pytest.mark.parametrize("radius", [1.0, 1e6])
