@@ -7,6 +7,7 @@ refinement; Newton's method on the surface takes them to round-off.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import ngsolve as ng
@@ -96,17 +97,26 @@ def cad_faces(mesh: ng.Mesh) -> list[CadFace] | None:
     return faces
 
 
+def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Array, Array | None]]:
+    """CAD faces that have some of the `facets` (n,); none without CAD.
+
+    With each the positions (k,) of its facets in `facets`, parameters (k, 3, 2) of their corners,
+    and the unit normal (3,) if it is plane.
+    """
+    faces, view = cad_faces(mesh) or [], MeshArrays(mesh)
+    region, uv = view.boundaries, view.surface_parameters
+    for number in np.unique(region[facets]) if faces else ():
+        face, at = faces[number], np.flatnonzero(region[facets] == number)
+        yield face, at, uv[facets[at]], face.plane(uv[region == number].reshape(-1, 2))
+
+
 def curved_facets(mesh: ng.Mesh) -> Mask | None:
     """Facets (k,) of curved CAD faces; None without CAD."""
-    faces = cad_faces(mesh)
-    if faces is None:
+    if cad_faces(mesh) is None:
         return None
-    view = MeshArrays(mesh)
-    region, uv = view.boundaries, view.surface_parameters
-    curved = np.zeros(len(region), dtype=bool)
-    for number in np.unique(region):
-        at = region == number
-        curved[at] = faces[number].plane(uv[at].reshape(-1, 2)) is None
+    curved = np.zeros(mesh.GetNE(ng.BND), dtype=bool)
+    for _, at, _, plane in _by_face(mesh, np.arange(len(curved))):
+        curved[at] = plane is None
     return curved
 
 
@@ -124,18 +134,14 @@ def face_normals(mesh: ng.Mesh, facets: Index, shapes: Array, points: Array) -> 
 
     The points lie on `facets` (k,), where the functions of degree 1 are `shapes` (k, 3).
     """
-    faces = cad_faces(mesh)
-    if faces is None:
+    if cad_faces(mesh) is None:
         return None
-    view = MeshArrays(mesh)
-    region, uv = view.boundaries, view.surface_parameters
     normals = np.zeros((len(facets), 3))
-    for number in np.unique(region[facets]):
-        at, face = np.flatnonzero(region[facets] == number), faces[number]
-        if (plane := face.plane(uv[region == number].reshape(-1, 2))) is not None:
+    for face, at, uv, plane in _by_face(mesh, facets):
+        if plane is not None:
             normals[at] = plane
             continue
-        start = np.einsum("ki,kid->kd", shapes[at], unwrapped(uv[facets[at]]))
+        start = np.einsum("ki,kid->kd", shapes[at], unwrapped(uv))
         # Facets share their nodes: each place once.
         size = np.abs(points[at]).max(initial=0.0) or 1.0
         rounded = np.round(points[at] / size, 13)
@@ -151,12 +157,10 @@ def beyond_faces(mesh: ng.Mesh, facets: Index, points: Array, outward: Array) ->
     Negative within the body, where `outward` (k, 3) points away from it; infinite at plane faces
     and without CAD.
     """
-    beyond, faces, view = np.full(len(points), np.inf), cad_faces(mesh) or [], MeshArrays(mesh)
-    region, uv = view.boundaries, view.surface_parameters
-    for number in np.unique(region[facets]) if faces else ():
-        at, face = np.flatnonzero(region[facets] == number), faces[number]
-        if face.plane(uv[region == number].reshape(-1, 2)) is None:
-            feet = face.project(points[at], unwrapped(uv[facets[at]]).mean(axis=1))
+    beyond = np.full(len(points), np.inf)
+    for face, at, uv, plane in _by_face(mesh, facets):
+        if plane is None:
+            feet = face.project(points[at], unwrapped(uv).mean(axis=1))
             normal = face.normal_at(feet)
             normal *= np.sign((normal * outward[at]).sum(axis=1))[:, None]
             beyond[at] = ((points[at] - face.point(feet)) * normal).sum(axis=1)

@@ -480,11 +480,10 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         with MESHING, one_thread():
             identify_coinciding_faces(problem, shape)
             mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=maxh))
-        _require_complete(mesh, problem)
-        return mesh
-    with MESHING:  # sizes and divisions are set on the shape, which others may mesh, too
-        edges = divided(problem, shape, maxh, maxh / finer)
-        mesh = _generated(shape, edges, maxh=maxh)
+    else:
+        with MESHING:  # sizes and divisions are set on the shape, which others may mesh, too
+            edges = divided(problem, shape, maxh, maxh / finer)
+            mesh = _generated(shape, edges, maxh=maxh)
     _require_complete(mesh, problem)
     return mesh
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -502,15 +502,10 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
             axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
     if np.ptp(part) > 0:
         axes.set_xlim(*part / length)
-    draw_profiles(axes, style, part)
-    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     arcs = [pair.direction is None for pair in contact]
     names = ["arc position"] * any(arcs) + ["η, along the contact line"] * (not all(arcs))
-    title = "contact pressure"
-    axes.set(xlabel=style.title(" or ".join(names), "length"), title=title)
-    axes.set_ylabel(style.title(title, "stress"))
-    axes.ticklabel_format(**POWERS)
-    axes.grid(alpha=0.3)
+    finish_pressures(axes, style, part, names)
+    axes.set_title("contact pressure")
 
 
 def colour_and_mark(pair: int) -> tuple[str, str]:
@@ -519,8 +514,11 @@ def colour_and_mark(pair: int) -> tuple[str, str]:
     return COLOURS[pair % n], MARKS[(pair + pair // n) % len(MARKS)]
 
 
-def draw_profiles(axes: Axes, style: Style, part: Array) -> None:
-    """The given profiles over the pressures; functions on the interval `part` (2,)."""
+def finish_pressures(axes: Axes, style: Style, part: Array, names: Iterable[str]) -> None:
+    """Labels, and the given profiles over the pressures; functions on the interval `part` (2,).
+
+    The coordinate has one of the `names`.
+    """
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     for k, (label, profile) in enumerate(style.profile.items()):
         if callable(profile):
@@ -530,3 +528,8 @@ def draw_profiles(axes: Axes, style: Style, part: Array) -> None:
             s, p = (np.asarray(values, dtype=float) for values in profile)
         stroke = STROKES[k % len(STROKES)]
         axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label, zorder=3)
+    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
+    axes.set_xlabel(style.title(" or ".join(names), "length"))
+    axes.set_ylabel(style.title("contact pressure", "stress"))
+    axes.ticklabel_format(**POWERS)
+    axes.grid(alpha=0.3)

@@ -292,7 +292,7 @@ def picture(solution: Solved, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
     shown = style.shown(solution)
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
-    mesh, u, scale = solution.mesh, solution.displacement, style.scale
+    mesh = solution.mesh
     order = max(mesh.GetCurveOrder(), solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
         order = int(np.clip(np.sqrt(MAX_TRIANGLES / mesh.ne), 1, 2 * order))
@@ -301,12 +301,7 @@ def picture(solution: Solved, style: Style) -> Scene:
     edges = nodes.cells[:, sides].reshape(-1, order + 1)
     ends = np.sort(edges[:, [0, -1]], axis=1)
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
-    found = nodes.values(ng.CF((ng.x, ng.y, *u)))
-    place, move = found[:, :2], found[:, 2:]
-    if scale is None:
-        body = np.empty(len(place), dtype=np.intp)
-        body[nodes.cells] = nodes.body[:, None]
-        scale = chosen_scale(solution, place, move, body)
+    place, moved, scale = moved_nodes(solution, nodes, style)
     zones = [zone.rows for zone in zones_of(solution, contact_lines(solution))]
     zones.sort(key=lambda rows: -float(np.abs(solution.force[rows]).sum()))
     tree = KDTree(place)
@@ -314,13 +309,13 @@ def picture(solution: Solved, style: Style) -> Scene:
     scene = Scene(
         solution=solution,
         style=style,
-        moved=place + scale * move,
+        moved=moved,
         shown=shown,
         values=shown.values(nodes),
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
         edges=edges[first],
         outline=count == 1,
-        zones=[place[zone] + scale * move[zone] for zone in at],
+        zones=[moved[zone] for zone in at],
         scale=scale,
     )
     if solution.problem.model in ABOUT_AN_AXIS:
@@ -328,7 +323,7 @@ def picture(solution: Solved, style: Style) -> Scene:
         return _mirrored(scene, SymmetryLine(np.zeros(2), np.array([1.0, 0.0]), slack), place)
     if style.mirror is None:
         return scene
-    return _mirrored(scene, symmetry_line(mesh, u, style.mirror), place)
+    return _mirrored(scene, symmetry_line(mesh, solution.displacement, style.mirror), place)
 
 
 def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
@@ -350,7 +345,19 @@ def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     )
 
 
-def chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
+def moved_nodes(solution: Solved, nodes: Nodes, style: Style) -> tuple[Array, Array, float]:
+    """Places (k, d) of nodes before and (k, d) after displacement, and the factor on that."""
+    d = solution.mesh.dim
+    found = nodes.values(ng.CF((*(ng.x, ng.y, ng.z)[:d], *solution.displacement)))
+    place, move, scale = found[:, :d], found[:, d:], style.scale
+    if scale is None:
+        body = np.empty(len(place), dtype=np.intp)
+        body[nodes.cells] = nodes.body[:, None]
+        scale = _chosen_scale(solution, place, move, body)
+    return place, place + scale * move, scale
+
+
+def _chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
     Of nodes at `place` (k, d), which `move` (k, d), of the bodies of numbers `body` (k,).

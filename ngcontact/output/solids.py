@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index
@@ -20,11 +19,11 @@ from .pictures import (
     Scale,
     colour_bar,
     colour_limits,
-    draw_profiles,
+    finish_pressures,
     new_figure,
     show,
 )
-from .scene import AXES, STRAIGHT, Style, chosen_scale
+from .scene import AXES, STRAIGHT, Style, moved_nodes
 from .surface import ContactSurface, contact_surface
 
 if TYPE_CHECKING:
@@ -165,11 +164,8 @@ def _grid(solution: Solved, style: Style) -> tuple[pyvista.UnstructuredGrid, Ind
 
     order, shown = max(solution.mesh.GetCurveOrder(), solution.order), style.shown(solution)
     nodes = nodes_of(solution.mesh, order)
-    found = nodes.values(ng.CF((ng.x, ng.y, ng.z, *solution.displacement)))
-    place, move, body = found[:, :3], found[:, 3:], np.empty(len(found), dtype=np.intp)
-    body[nodes.cells] = nodes.body[:, None]
-    scale = chosen_scale(solution, place, move, body) if style.scale is None else style.scale
-    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][order - 1]: nodes.cells}, place + scale * move)
+    _, moved, scale = moved_nodes(solution, nodes, style)
+    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][order - 1]: nodes.cells}, moved)
     grid.point_data["shown"] = shown.values(nodes) / style.unit(shown.kind)[1]
     faces = np.sort(nodes.cells[:, FACES], axis=2).reshape(-1, 3)
     _, same, count = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
@@ -331,14 +327,6 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         axes.plot(*drawn, color=COLOURS[k], label=names[-1])
         ends += list(np.clip(zone.middle @ along + np.array([-half, half]), s.min(), s.max()))
     part = np.array([min(ends), max(ends)])
-    draw_profiles(axes, style, part)
-    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
-    axes.set(
-        xlim=(part[0] / length, part[-1] / length),
-        xlabel=style.title(" or ".join(dict.fromkeys(names)), "length"),
-        ylabel=style.title("contact pressure", "stress"),
-        title="contact pressure along the cuts",
-    )
-    axes.ticklabel_format(**POWERS)
-    axes.grid(alpha=0.3)
+    finish_pressures(axes, style, part, dict.fromkeys(names))
+    axes.set(xlim=part / length, title="contact pressure along the cuts")
     axes.legend()

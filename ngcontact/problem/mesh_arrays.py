@@ -9,6 +9,8 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, Index, Mask
 
@@ -130,9 +132,6 @@ class MeshArrays:
     @cached_property
     def pieces(self) -> Index:
         """Number (nv,) of the connected piece of the mesh that each vertex belongs to."""
-        from scipy.sparse import csr_array  # not needed to state a problem
-        from scipy.sparse.csgraph import connected_components
-
         key = hash(self.elements.tobytes())
         known = self.mesh.__dict__.get(PIECES)
         if known is not None and known[0] == key:
@@ -141,7 +140,7 @@ class MeshArrays:
         # Vertices first, to be numbered first, then elements, each joined to its vertices.
         starts = np.concatenate([np.zeros(nv), corners * np.arange(ne + 1)]).astype(np.int32)
         joins = self.elements.ravel().astype(np.int32)
-        graph = csr_array((np.ones(joins.size), joins, starts), (nv + ne, nv + ne))
+        graph = sp.csr_array((np.ones(joins.size), joins, starts), (nv + ne, nv + ne))
         found = connected_components(graph, directed=False)[1][:nv].astype(np.intp)
         self.mesh.__dict__[PIECES] = key, found
         return found

@@ -41,16 +41,16 @@ END_DEGREE = 3  # of such a degree
 IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47), "strain": (5, 11, 23, 47)}
 WINDOW_SAMPLES = 4  # samples, half of them on each side
 LOSS_GROWTH = 1.5  # times what a window loses, from which the next one loses more than a feature
-# Departures that count: of loads relative to their mean size, of laws in their logarithm, of
-# displacements and gaps relative to their range.
+# Departures that count: of loads and strains relative to their mean size, of laws in their
+# logarithm, of displacements and gaps relative to their range.
 FEATURE_SHARES = {
     "traction": 0.1,
     "force": 0.1,
     "materials": 0.1,
     "displacement": 1e-5,
     "gap": 1e-5,
+    "strain": 0.1,
 }
-FEATURE_SHARES["strain"] = 0.1  # ... as of loads
 VALUE_ROUND_OFF = 1e-10  # of values, relative to the largest
 NARROW_SAMPLES = 6  # samples in a feature up to which what is between them is looked at
 WIDTH_POINTS = 65  # points across a feature, to measure its width
@@ -97,7 +97,7 @@ class Features:
 
 
 NO_JUMPS = np.empty((0, 3))
-LOADS = ("traction", "force", "strain")
+LOADS = ("force", "traction", "strain")
 
 
 class Datum(NamedTuple):
@@ -118,9 +118,9 @@ def _functions(problem: Problem) -> Iterator[Datum]:
     """All data that are no numbers; of solids none are looked at."""
     if problem.dim == 3:
         return
-    data = [Datum("force", name, 0, F, F) for name, F in problem.force.items()]
-    data += [Datum("traction", name, 0, p, p) for name, p in problem.traction.items()]
-    data += [Datum("strain", name, 0, e, e) for name, e in problem.strain.items()]
+    data = [
+        Datum(kind, name, 0, f, f) for kind in LOADS for name, f in getattr(problem, kind).items()
+    ]
     for name, components in problem.displacement.items():
         data += [Datum("displacement", name, axis, u, u) for axis, u in enumerate(components)]
     data += [Datum("gap", pair.secondary, 0, pair, pair.gap) for pair in problem.contact]
@@ -371,11 +371,8 @@ def _in_body(
     """Features (k, 3) of a function in a body, and all its samples (n, c)."""
     corners = view.arrays.corners[elements].reshape(-1, 2)
     spacing = BODY_SPACING * float(np.ptp(corners, axis=0).max())
-    c, s = (
-        np.cos([LATTICE_ANGLE, LATTICE_ANGLE + np.pi / 3]),
-        np.sin([LATTICE_ANGLE, LATTICE_ANGLE + np.pi / 3]),
-    )
-    sides = spacing * np.column_stack([c, s])  # of the lattice's cells, as rows
+    angle = LATTICE_ANGLE + np.array([0, np.pi / 3])
+    sides = spacing * np.column_stack([np.cos(angle), np.sin(angle)])  # of the cells, as rows
     corners = corners @ np.linalg.inv(sides)
     origin = np.floor(corners.min(axis=0))
     shape = tuple(np.ceil(corners.max(axis=0) - origin).astype(int) + 1)

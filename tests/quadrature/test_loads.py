@@ -16,9 +16,13 @@ from ngcontact.quadrature import SampledElements, rough_load
 from tests.scenes import rectangle
 
 
+def square():
+    return compound(rectangle("body", (0, 1), (0, 1), ("bottom", "right", "top", "left")))
+
+
 def loaded(**data):
     return Problem(
-        geometry=compound(rectangle("body", (0, 1), (0, 1), ("bottom", "right", "top", "left"))),
+        geometry=square(),
         materials={"body": Elastic(1.0, 0.3)},
         displacement={"bottom": (0, 0)},
         **data,
