@@ -112,6 +112,16 @@ def across(d: Array) -> Array:
     return turned
 
 
+def chords(x: Array) -> Array:
+    """Distances (n - 1,) of neighbours among the points `x` (n, d)."""
+    return np.linalg.norm(np.diff(x, axis=0), axis=1)
+
+
+def distances_along(x: Array) -> Array:
+    """Lengths (n,) of the way along the points `x` (n, d) from the first."""
+    return np.concatenate([[0.0], np.cumsum(chords(x))])
+
+
 def rightward(slope: Array, other: Array | None = None) -> Array:
     """Unit normals (..., d) of a curve with `slope` (..., 2), or of a surface with two slopes.
 

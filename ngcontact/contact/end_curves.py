@@ -41,7 +41,7 @@ def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) ->
     size = trace.sizes(line.segments)
 
     def at_nodes(values: Array) -> Array:
-        known = np.append(values, np.nan)[line.rows]
+        known = line.on_segments(values, np.nan)
         return with_vertices(known, line.rows < 0, name, size, within=True)
 
     closed = np.where(active, state.pressure**2, 0.0)

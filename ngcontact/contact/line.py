@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, from_triplets, rows_of
 from ..problem import Contact
@@ -50,9 +51,17 @@ class ContactLine:
         """Dimension of the bodies."""
         return int(self.position.shape[1])
 
+    def on_segments(self, values: NDArray[Any], missing: Any) -> NDArray[Any]:
+        """Values (k, q) at the nodes of segments, of `values` (m,) at points, `missing` without.
+
+        Of vectors `values` (m, d) vectors (k, q, d).
+        """
+        last = np.full((1, *values.shape[1:]), missing, values.dtype)
+        return np.asarray(np.concatenate([values, last])[self.rows])
+
     def rows_at(self, nodes: Index) -> Index:
         """Contact points (k, q) that lie at the `nodes` (k, q) of the segments; -1 where none."""
-        return np.where(np.append(self.node, -1)[self.rows] == nodes, self.rows, -1)
+        return np.where(self.on_segments(self.node, -1) == nodes, self.rows, -1)
 
     def covered_shares(self, on_parts: Array, everywhere: Array) -> Array:
         """Integrals (k,) of functions over the parts that face, over those on whole facets.
@@ -61,7 +70,7 @@ class ContactLine:
         The same values give 1 where nodes face nodes.
         """
         pairs = (self.covered, on_parts), (self.shares, everywhere)
-        part, whole = ((x * np.append(v, 0.0)[self.rows]).sum(axis=1) for x, v in pairs)
+        part, whole = ((x * self.on_segments(v, 0.0)).sum(axis=1) for x, v in pairs)
         return np.asarray(np.divide(part, whole, out=np.zeros(len(part)), where=whole > 0))
 
     def pressure(self, force: Array) -> Array:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import brentq
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, distances_along
 from ..fem import ORDERS
 from .line import ContactLine, by_line, in_contact, links, twins
 
@@ -109,8 +109,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
             continue
         if len(opened) > 1 and any(active[i] for i in neighbours[opened[-1]]):
             opened = opened[: (len(opened) + 1) // 2]  # its other end uses the other half
-        steps = np.linalg.norm(np.diff(x[[inner, *opened]], axis=0), axis=1)
-        distance = np.cumsum(steps)
+        distance = distances_along(x[[inner, *opened]])[1:]
         if order > ORDERS[-1]:  # of `polish`: a vertex of the mesh lies there
             at: float | None = 0.0
         else:
@@ -120,7 +119,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
         closed = closed[:2]
         beyond.append(at)
         path = np.array([*closed[::-1], *opened])
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x[path], axis=0), axis=1))])
+        along = distances_along(x[path])
         at += along[len(closed) - 1]
         ends.append((inner, outer))
         found.append([np.interp(at, along, x[path, axis]) for axis in (0, 1)])
@@ -170,6 +169,11 @@ class ContactState:
         """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,): units of stress."""
         pressure = self.line.pressure(self.force)  # (3.10), (3.10')
         return continued_to_axis(self.line, pressure, self.active)
+
+    @property
+    def touched(self) -> Mask:
+        """Segments (k,) with a point in contact."""
+        return np.asarray(self.line.on_segments(self.active, False).any(axis=1))
 
     @cached_property
     def transitions(self) -> Transitions:

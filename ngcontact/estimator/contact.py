@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..arrays import Array, Index, Mask, across, joined, rows_of
+from ..arrays import Array, Index, Mask, across, chords, joined, rows_of
 from ..contact import (
     FACING_COSINE,
     GAP_ROUND_OFF,
@@ -162,7 +162,7 @@ def directions(
     if line.contact.direction is not None:
         d = np.full((len(s), 2), line.contact.direction)
         return d, np.zeros_like(d)
-    nodal = np.append(line.direction, np.zeros((1, 2)), axis=0)[line.rows]
+    nodal = line.on_segments(line.direction, 0.0)
     without = line.rows < 0  # ends of Gamma_K on Gamma_u; parts that do not face
     if without.any():
         segment, at_node = boundary.at_nodes(line.segments)
@@ -259,7 +259,7 @@ def closing_energy(
         return stiffness * w**2
     size, position = len(boundary.region), boundary.point(segment, s)
     measure = solution.model.measure(position)
-    apart = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    apart = chords(position)
     # Points coincide to round-off at a jump.
     steep = np.divide(change, apart, out=np.zeros_like(change), where=apart > 0) * measure[1:]
     square = np.bincount(segment, weight * w**2, size)
@@ -329,8 +329,8 @@ def at_nodes(
     Gamma_u; the state (k, order + 1) is whether it is in contact, without a point true.
     """
     line = pair.line
-    pressure = np.append(pair.pressure, np.nan)[line.rows]
-    active = np.append(pair.active, True)[line.rows]
+    pressure = line.on_segments(pair.pressure, np.nan)
+    active = line.on_segments(pair.active, True)
     nodes, (segment, s) = boundary.nodes[line.segments].ravel(), boundary.at_nodes(line.segments)
     for other in pairs if (line.rows < 0).any() else ():
         if other is pair:

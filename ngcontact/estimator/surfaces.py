@@ -94,7 +94,7 @@ def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Ar
     At order 2 linear through the middles of edges, with Bernstein's polynomials where vertices have
     rows, too.
     """
-    value = np.append(pair.force / pair.line.weight, 0.0)[pair.line.rows]
+    value = pair.line.on_segments(pair.force / pair.line.weight, 0.0)
     if trace.order != 2:
         return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
     edges = value[:, 3:]
@@ -115,7 +115,7 @@ OPPOSITE = np.array([({0, 1, 2} - set(edge)).pop() for edge in triangle.EDGES.to
 
 def _in_contact(pair: ContactState) -> Mask:
     """Facets (k,) of a zone all of whose rows are active."""
-    active = np.append(pair.active, False)[pair.line.rows]
+    active = pair.line.on_segments(pair.active, False)
     has = pair.line.rows >= 0
     return np.asarray((active | ~has).all(axis=1) & has.any(axis=1))
 

@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, chords, distances_along
 from ..errors import warn
 from ..problem import check_mesh
 
@@ -315,14 +315,14 @@ def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], flo
         else:
             largest = max([largest, *(_turn(*at[s.stop]) for s in run if s.stop in smooth)])
             closed = nodes[0] == nodes[-1] and nodes[0] in smooth
-            t = np.cumsum([0.0, *np.linalg.norm(np.diff(x, axis=0), axis=1)])
+            t = distances_along(x)
             slope = make_interp_spline(
                 t, x, min(5, len(x) - 1), bc_type="periodic" if closed else None
             )(t, 1)
             for k in () if closed else (0, -1):  # it goes on in another curve, or a straight line
                 slope[k] = smooth.get(nodes[k], slope[k])
             # The kernel compares the lengths of tangents with `tol`, and uses their directions.
-            step = float(np.linalg.norm(np.diff(x, axis=0), axis=1).min())
+            step = float(chords(x).min())
             slope *= step / np.linalg.norm(slope, axis=1)[:, None]
             edge = occ.SplineInterpolation(
                 [occ.Pnt(*p, 0) for p in x],

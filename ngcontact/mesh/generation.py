@@ -16,7 +16,7 @@ import numpy as np
 from netgen.meshing import MeshingParameters
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask, across, rightward
+from ..arrays import Array, Index, Mask, across, chords, rightward
 from ..problem import Contact, MeshArrays, Problem
 from ..threads import one_thread
 from .cad import CadEdge
@@ -59,8 +59,7 @@ FACE_DISTANCE = 1e-6
 
 def _elements(x: Array, maxh: float | Size) -> Array:
     """Numbers (k - 1,) of elements between neighbours of the points `x` (k, 2)."""
-    lengths = np.linalg.norm(np.diff(x, axis=0), axis=1)
-    return np.asarray(lengths / (maxh((x[:-1] + x[1:]) / 2) if callable(maxh) else maxh))
+    return np.asarray(chords(x) / (maxh((x[:-1] + x[1:]) / 2) if callable(maxh) else maxh))
 
 
 def _segments(x: Array, y: Array, maxh: float | Size) -> Array:
@@ -190,7 +189,7 @@ def _at_least(x: Array, edge: CadEdge) -> Array:
 
     That from the box of its samples, which it leaves by no more than the way between two of them.
     """
-    step = np.linalg.norm(np.diff(edge.samples, axis=0), axis=1).max()
+    step = chords(edge.samples).max()
     low, high = edge.samples.min(axis=0) - step, edge.samples.max(axis=0) + step
     return np.linalg.norm(np.maximum(np.maximum(low - x, x - high), 0.0), axis=1)
 
@@ -198,7 +197,7 @@ def _at_least(x: Array, edge: CadEdge) -> Array:
 def _near(secondary: CadEdge, facing: list[Edge]) -> list[Edge]:
     """The edges of `facing` that may be the nearest to some point of a curve."""
     x = secondary.samples
-    step = np.linalg.norm(np.diff(x, axis=0), axis=1).max()
+    step = chords(x).max()
     samples = np.concatenate([edge.curve.samples for edge in facing])
     reach = cKDTree(samples).query(x)[0] + 2 * step  # more than the distance at any point
     return [edge for edge in facing if (_at_least(x, edge.curve) <= reach).any()]
@@ -316,7 +315,7 @@ def _divide(
     maxh = min(secondary.maxh, primary.maxh)
     sliver = MIN_NODE_DISTANCE * min(maxh, secondary.curve.size, primary.curve.size)
     for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
-        if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
+        if chords(x[run]).sum() < sliver:
             continue  # beside the vertex of one edge, which faces near that of another
         if secondary.size is None:
             places = narrowest(t[run], x[run], y[run], maxh, gap)
@@ -520,7 +519,7 @@ def graded_mesh(problem: Problem, size: Size, places: Array) -> ng.Mesh:
         for edge in edges:  # what partitions ask for, elements inside of bodies do not know
             share = np.array([0.0, *edge.partition(), 1.0])
             x = edge.curve.point(edge.curve.start + share * (edge.curve.stop - edge.curve.start))
-            middle, length = (x[:-1] + x[1:]) / 2, np.linalg.norm(np.diff(x, axis=0), axis=1)
+            middle, length = (x[:-1] + x[1:]) / 2, chords(x)
             for (a, b), h in zip(middle.tolist(), length.tolist(), strict=True):
                 parameters.RestrictH(a, b, 0.0, h)
         mesh = _generated(shape, edges, mp=parameters)

@@ -11,7 +11,7 @@ import ngsolve as ng
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, Mask, across, paths
+from ..arrays import Array, Index, Mask, across, distances_along, paths
 from ..contact import neighbours
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS, MeshArrays
@@ -196,8 +196,7 @@ def contact_lines(solution: Solved) -> list[ContactPath]:
         for path in paths(neighbours(line), len(rows)) if direction is None and len(rows) else ():
             path = path[:-1] if len(path) > 1 and path[0] == path[-1] else path
             path = path[:: int(_rising(np.diff(line.position[path[[0, -1]]], axis=0)[0]))]
-            steps = np.linalg.norm(np.diff(line.position[path], axis=0), axis=1)
-            s = start + np.concatenate([[0.0], np.cumsum(steps)])
+            s = start + distances_along(line.position[path])
             lines.append(ContactPath(pair, rows[path], s))
             start = s[-1]
     return lines

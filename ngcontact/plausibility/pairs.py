@@ -273,7 +273,7 @@ def _samples_of_surfaces(trace: BoundaryTrace, state: ContactState) -> _Samples:
     parts, _ = facing_pieces(trace, zone, np.asarray((zone.rows >= 0).any(axis=1)))
     places = np.vstack([trace.vertices, triangle.CENTRE])
     each = rows_of(parts, np.arange(len(parts.local)).repeat(len(places)))
-    opened = np.asarray(np.append(~state.active, False)[zone.rows].any(axis=1))
+    opened = np.asarray(zone.on_segments(~state.active, False).any(axis=1))
     some = np.flatnonzero(opened[each.local])
     each, s = rows_of(each, some), parts.places(places)[some]
     x = trace.point(zone.segments[each.local], s)
@@ -344,8 +344,7 @@ def inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> Array:
     The smaller one of both surfaces, of each the normal that is nearest to `xi`; 0 at open points.
     """
     line, cosine = state.line, np.full(len(state.active) + 1, -1.0)
-    touching = np.append(state.active, False)[line.rows].any(axis=1)
-    rows, segments = line.rows[touching], line.segments[touching]
+    rows, segments = line.rows[state.touched], line.segments[state.touched]
     np.maximum.at(cosine, rows.ravel(), trace.exact_normal(*trace.at_nodes(segments)) @ xi)
     if line.contact.primary is None and len(xi) == 2:  # a line: the secondary moved by the gap
         whole = rows[(rows >= 0).all(axis=1)]

@@ -15,7 +15,7 @@ import netgen.meshing as ngm
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, chords
 from ..contact import ContactState, Transitions, contact_line, faced_vertices, twins
 from ..discrete import carried_active_set
 from ..fem import boundary_trace, model_of
@@ -207,7 +207,7 @@ def isolated(state: ContactState) -> Mask:
 
 def _half_length(line_ends: Transitions, run: Index, x: Array) -> float:
     """Length of a `run` of points `x` (m, 2) from an end; half of it if another end follows."""
-    length = float(np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum())
+    length = float(chords(x[run]).sum())
     both = np.concatenate([line_ends.inner, line_ends.outer])
     return length / 2 if np.count_nonzero(both == run[-1]) > (len(run) == 1) else length
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, joined, rows_of
+from ..arrays import Array, Index, distances_along, joined, rows_of
 from ..fem import BoundaryTrace, von_mises
 from ..output import COMPONENTS, principal_stresses, stress_tensors
 from ..problem import MeshArrays, body_mask, regions_of
@@ -188,8 +188,7 @@ class Values:
     @property
     def distance(self) -> Array:
         """Length (k,) of the way along `points` (k, 2) from the first."""
-        steps = np.diff(self.points.reshape(-1, self.points.shape[-1]), axis=0)
-        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+        return distances_along(self.points.reshape(-1, self.points.shape[-1]))
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """A table by columns (k,), one row a point, as data frames and files are made from."""

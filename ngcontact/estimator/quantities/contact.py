@@ -5,7 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, distances_along
 from ...contact import ContactState, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies, prescribed_components
 from ...lagrange import gauss
@@ -50,11 +50,11 @@ def peak_of(
     if star is not None:
         off = np.maximum(off, STAR_FACTOR * _off_star(pair, star))
     segment, s = boundary.at_places(line.segments, SAMPLES)
-    every = np.repeat(rows, len(SAMPLES), axis=0)
-    samples = (np.append(pressure, 0.0)[every] * boundary.shapes(segment, s)).sum(axis=1)
-    errors = np.append(off, 0.0)[every].max(axis=1)
+    values, errors = (line.on_segments(x, 0.0) for x in (pressure, off))
+    samples = (values.repeat(len(SAMPLES), axis=0) * boundary.shapes(segment, s)).sum(axis=1)
+    errors = errors.max(axis=1).repeat(len(SAMPLES))
     # The peak is on segments with a point in contact, or beside such.
-    touched = rows[np.append(pair.active, False)[rows].any(axis=1)]
+    touched = rows[pair.touched]
     near = np.isin(rows, touched[touched >= 0]).any(axis=1)
     counts = ~corners.near(boundary.point(segment, s), pressed=True)
     counts &= np.repeat(near, len(SAMPLES))
@@ -74,7 +74,7 @@ def _pressed_corners(corners: Singular, points: Array) -> Array:
 def _off_star(pair: ContactState, star: Array) -> Array:
     """Differences (m,) of pressures to p* at contact points, the larger of two."""
     rows, result = pair.line.rows, np.zeros(len(pair.force) + 1)
-    off = star.reshape(rows.shape) - np.append(pair.pressure, 0.0)[rows]
+    off = star.reshape(rows.shape) - pair.line.on_segments(pair.pressure, 0.0)
     np.maximum.at(result, rows, np.abs(off))
     return result[:-1]
 
@@ -121,12 +121,8 @@ def _error_of_end(pair: ContactState, number: int) -> float:
     if step == 0 or not pair.active[closed[0]]:  # both sides of a corner
         return 0.0
 
-    def along(run: Index) -> Array:
-        steps = np.linalg.norm(np.diff(x[run], axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
-
-    inside = along(closed) + ends.beyond[number]
-    outside = step + along(opened) - ends.beyond[number]
+    inside = distances_along(x[closed]) + ends.beyond[number]
+    outside = step + distances_along(x[opened]) - ends.beyond[number]
     gap, squares = np.maximum(pair.gap[opened], 0.0) ** (2 / 3), pair.pressure[closed] ** 2
     zone, found = max(float(inside[-1]), step), []
     for t, y in ((outside, gap), (inside, squares)):
@@ -152,7 +148,7 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     if not pair.active.any():
         return 0.0, 0.0
     active, closed = (
-        np.append(mask, False)[line.rows] for mask in (pair.active, in_contact(line, pair.active))
+        line.on_segments(mask, False) for mask in (pair.active, in_contact(line, pair.active))
     )
     places, (t, w) = boundary.places(line.segments), gauss(boundary.geometry_order + 2)
     width = np.diff(places, axis=1)
@@ -194,7 +190,7 @@ def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
     """
     line = pair.line
     held = (line.rows < 0) & line.faces[:, None]
-    beside = np.abs(np.append(pair.pressure, 0.0)[line.rows]).max(axis=1)
+    beside = np.abs(line.on_segments(pair.pressure, 0.0)).max(axis=1)
     some = np.flatnonzero(held.any(axis=1) & (beside > 0))
     if not len(some):
         return 0.0

@@ -44,7 +44,7 @@ def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
     the share that faces it: the resultant of each is that of its rows.
     """
     line, known = state.line, state.line.rows >= 0
-    values = np.asarray(np.append(state.pressure, 0.0)[line.rows])
+    values = line.on_segments(state.pressure, 0.0)
     partly = np.flatnonzero(known.any(axis=1) & ~line.faces)
     force, s = (line.covered * values)[partly].sum(axis=1), trace.places(line.segments)
     for i in partly:
@@ -59,7 +59,7 @@ def pressure_at_vertices(trace: FacetTrace, state: ContactState) -> Array:
     line, whole = state.line, np.ones(len(state.force))
     vertices = trace.nodes[line.segments]
     size = trace.sizes(line.segments) * line.covered_shares(whole, whole)
-    values = np.append(state.pressure, np.nan)[line.rows]
+    values = line.on_segments(state.pressure, np.nan)
     values = with_vertices(values, line.rows < 0, vertices, size)[:, :3]
     known = np.isfinite(values)
     share, at, n = (known * size[:, None])[known], vertices[:, :3], trace.mesh.nv
@@ -103,8 +103,7 @@ def _mean_traction(
     """
     line, d = state.line, trace.order - 1
     boundary = solution.mesh.Boundaries(line.contact.secondary)
-    touched = np.append(state.active, False)[line.rows].any(axis=1)
-    facets = line.segments[touched]
+    facets = line.segments[state.touched]
     points, weights = triangle.gauss(2 * d)
     facet, s = trace.at_places(facets, points)
     directions, x = rays(trace, line.contact, facet, s), trace.point(facet, s)
@@ -125,6 +124,6 @@ def _mean_traction(
     size = jacobian(trace, line.contact, facet, s).reshape(-1, len(weights)) * weights
     values = values.reshape(size.shape)
     own = (size * values).sum(axis=1) / size.sum(axis=1)
-    values += (mean[touched] - own)[:, None]
+    values += (mean[state.touched] - own)[:, None]
     field = ng.GridFunction(ng.SurfaceL2(trace.mesh, order=d, definedon=boundary))
     return _fitted(field, trace, facets, s, values, size)
