@@ -8,6 +8,7 @@ points, so that every condition at a node concerns the two unknowns of that node
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -161,7 +162,8 @@ class BoundaryTrace:
     inner: Mask  # (k,), between two triangles: lines inside a body
     curve: Array  # (k, geometry_order + 1, 2), at its Gauss-Lobatto points
     side: Array  # (k,), +1 where the outward normal lies right of the direction of s, else -1
-    edges: list[CadEdge] | None  # by region number
+    edges: list[CadEdge] | None  # by region number, of plane bodies
+    drawn: bool  # whether a geometry has the corners
     model: Model  # with the measure of segments
     axis: Index  # (k,), -1 or 1 where s = 0 or s = 1 alone lies on the axis of revolution, else 0
     on_axis: Mask  # (k,), segments that lie on it
@@ -201,16 +203,19 @@ class BoundaryTrace:
         """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
         return rightward(self.derivative(segment, s)) * self.side[segment, None]
 
+    def _by_edge(self, segment: Index) -> Iterator[tuple[CadEdge, Mask]]:
+        """CAD edges of segments (k,), each with a mask (k,) of its own; none without CAD."""
+        regions, edges = self.region[segment], self.edges or []
+        for region in set(regions.tolist()) if edges else ():
+            yield edges[region], regions == region
+
     def exact_normal(self, segment: Index, s: Array) -> Array:
         """Normals (k, 2) of the CAD edges, if any, at `s` (k,) of segments `segment` (k,)."""
-        normals, regions = self.normal(segment, s), self.region[segment]
-        if self.edges is not None:
-            points = self.point(segment, s)
-            for region in set(regions.tolist()):
-                here = regions == region
-                exact = self.edges[region].normal(points[here])
-                outward = (exact * normals[here]).sum(axis=1) >= 0
-                normals[here] = np.where(outward[:, None], exact, -exact)
+        normals = self.normal(segment, s)
+        for edge, here in self._by_edge(segment):
+            exact = edge.normal(self.point(segment[here], s[here]))
+            outward = (exact * normals[here]).sum(axis=1) >= 0
+            normals[here] = np.where(outward[:, None], exact, -exact)
         return normals
 
     @cached_property
@@ -232,16 +237,14 @@ class BoundaryTrace:
 
         Negative within the body; infinite at straight curves and without CAD.
         """
-        beyond, edges = np.full(len(points), np.inf), self.edges or []
+        beyond = np.full(len(points), np.inf)
         outward = self.normal(segment, np.full(len(segment), 0.5))
-        for region in np.unique(self.region[segment]) if edges else ():
-            edge = edges[region]
-            at = np.flatnonzero(self.region[segment] == region)
+        for edge, here in self._by_edge(segment):
             if not edge.straight:
-                normal = edge.normal(points[at])
-                normal *= np.sign((normal * outward[at]).sum(axis=1))[:, None]
-                foot = edge.point(edge.project(points[at]))
-                beyond[at] = ((points[at] - foot) * normal).sum(axis=1)
+                x = points[here]
+                normal = edge.normal(x)
+                normal *= np.sign((normal * outward[here]).sum(axis=1))[:, None]
+                beyond[here] = ((x - edge.point(edge.project(x))) * normal).sum(axis=1)
         return beyond
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
@@ -397,6 +400,14 @@ class BoundaryTrace:
         normal = self.normal(segment, s)
         return np.einsum("kij,kj->ki", sigma.reshape(-1, *stress.dims), normal)
 
+    def _corner(self, first: Index, second: Index, turn: Array) -> Mask:
+        """Whether pairs of segments (k,) at a node are corners; their normals differ by `turn`."""
+        if self.drawn:
+            return turn > CORNER
+        names = np.array(self.mesh.GetBoundaries())
+        named = names[self.region[first]] != names[self.region[second]]
+        return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
+
     def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
         """Number the nodes of several segments: once each, twice at a corner.
 
@@ -410,14 +421,7 @@ class BoundaryTrace:
         shared = number[first] == number[second]
         first, second = first[shared], second[shared]
         turn = np.linalg.norm(vector[first] - vector[second], axis=1)
-        # Corners: of the geometry where there is one.
-        if self.edges is not None:
-            corner = turn > CORNER
-        else:
-            names = np.array(self.mesh.GetBoundaries())[self.region[segment]]
-            named = names[first] != names[second]
-            corner = (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
-        second = second[corner]
+        second = second[self._corner(segment[first], segment[second], turn)]
         number[second] = number.max(initial=-1) + 1 + np.arange(second.size)
         mean = np.zeros((number.max(initial=-1) + 1, 2))
         np.add.at(mean, number, vector * self.lengths(segment)[:, None])
@@ -440,7 +444,7 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
     curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))
     curve = curve[:, :2].reshape(-1, degree + 1, 2)
 
-    element, inner = view.facet_elements, view.inner_facets
+    element, inner, edges = view.facet_elements, view.inner_facets, cad_edges(mesh)
     xy = view.vertices
     opposite = xy[view.elements[element]].mean(axis=1) - xy[ends[:, 0]]
     right = rightward(xy[ends[:, 1]] - xy[ends[:, 0]])
@@ -458,7 +462,8 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
         inner=inner,
         curve=curve,
         side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),
-        edges=cad_edges(mesh),
+        edges=edges,
+        drawn=edges is not None,
         model=model,
         axis=axis[:, -1].astype(np.intp) - axis[:, 0],
         on_axis=np.asarray(axis.all(axis=1)),

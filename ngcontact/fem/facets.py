@@ -19,10 +19,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, from_triplets
-from ..mesh import CadFace, beyond_faces, cad_faces, face_normals
+from ..mesh import beyond_faces, cad_faces, face_normals
 from ..problem import POSITION, MeshArrays
 from ..reference import triangle
-from .boundary import CORNER, CORNER_WITHOUT_CAD, CURVED_DISTANCE, BoundaryTrace, segment_trace
+from .boundary import CURVED_DISTANCE, BoundaryTrace, segment_trace
 from .model import PLANE, SOLID_MODEL, Model
 
 ENTRY_ROUND_OFF = 1e-13  # of changes of basis, whose entries are of size 1: round-off
@@ -39,7 +39,6 @@ class FacetTrace(BoundaryTrace):
 
     corners: ClassVar[list[int]] = [0, 1, 2]
     vertices: ClassVar[Array] = np.eye(3)  # (3, 3)
-    faces: list[CadFace] | None = None  # by region number
     # (n,), nodes whose unknown is a Bernstein coefficient; none when left out
     bernstein: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
@@ -196,14 +195,6 @@ class FacetTrace(BoundaryTrace):
         np.add.at(mean, number, vector * self.sizes(segment)[:, None])
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
 
-    def _corner(self, first: Index, second: Index, turn: Array) -> Mask:
-        """Whether pairs of facets (k,) at a node, whose normals differ by `turn`, form edges."""
-        if self.faces is not None:
-            return turn > CORNER
-        names = np.array(self.mesh.GetBoundaries())
-        named = names[self.region[first]] != names[self.region[second]]
-        return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
-
     def nodal_basis(self, segments: Index) -> sp.csr_array:
         """Matrix (n, n) from unknowns at the nodes of `segments` (k,), and others, to NGSolve's."""
         size = self.space.ndof
@@ -273,7 +264,7 @@ def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
         curve=curve,
         side=np.where(facing > 0, -1.0, 1.0),
         edges=None,
-        faces=cad_faces(mesh),
+        drawn=cad_faces(mesh) is not None,
         model=SOLID_MODEL,
         axis=zeros,
         on_axis=zeros > 0,
