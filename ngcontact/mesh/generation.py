@@ -13,7 +13,7 @@ from typing import Any
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
-from netgen.meshing import MeshingParameters
+from netgen.meshing import MeshingParameters, NgException
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, across, chords, rightward
@@ -478,7 +478,13 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         # of processor time so, .05 s with one thread.
         with MESHING, one_thread():
             identify_coinciding_faces(problem, shape)
-            mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=maxh))
+            try:
+                mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=maxh))
+            except NgException as error:
+                raise ValueError(
+                    f"Netgen makes no mesh of these solids ({error}): draw them by "
+                    "OCCGeometry(shape), as dim=2 turns faces inside out, or choose another maxh"
+                ) from error
     else:
         with MESHING:  # sizes and divisions are set on the shape, which others may mesh, too
             edges = divided(problem, shape, maxh, maxh / finer)

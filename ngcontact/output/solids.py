@@ -86,7 +86,7 @@ def plot_solids(
     target, _ = None if path is None else check_path(path, ".png"), style.shown(solution)
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     forces = [float(pair.force.sum()) if pair.gap.size else -np.inf for pair in solution.pairs]
-    pair, pairs = int(np.argmax(forces)), solution.problem.contact
+    pair, pairs = int(np.argmax(forces)) if forces else 0, solution.problem.contact
     zone = _zone(solution, pair) if len(solution.points) else None
     figure = new_figure(target, figsize=(12, 9.5 if zone else 6))
     close = zone is not None and zone.half < CLOSE_UP_SIZE * float(np.ptp(zone.surface.trace.curve))

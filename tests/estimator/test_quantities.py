@@ -99,7 +99,10 @@ def test_largest_stress_lies_on_the_bore_of_a_press_fit(order):
 
 
 def test_the_table_reads():
-    solution = solve(cases.hertz_contact().problem, maxh=0.25, order=2)
+    problem = cases.hertz_contact().problem
+    [contact] = problem.contact
+    turned = replace(contact, direction=(1e-17, contact.direction[1]))  # round-off is no direction
+    solution = solve(replace(problem, contact=[turned]), maxh=0.25, order=2)
     q = solution.quantities()
     names = [row.name for row in q]
     assert names[:5] == ["force", "force, x", "force, y", "contact area", "mean pressure"]

@@ -178,6 +178,13 @@ def test_of_a_closed_surface_the_front_is_drawn(tmp_path):
     assert area == pytest.approx(np.pi, rel=0.3)  # of its shadow: that of a coarse polyhedron
 
 
+def test_without_contact_the_bodies_are_drawn(tmp_path):
+    problem = replace(pressed_cube(1).problem, contact=[], traction={}, sliding="cube_bottom")
+    free = replace(problem, displacement={"block_bottom|cube_top": (0, 0, 0)})
+    figure = plot_solids(solve(free, maxh=0.7, order=1), tmp_path / "a.png")
+    assert panel(figure, "deformed").images
+
+
 def test_what_is_positive_has_no_negative_colours(tmp_path):
     """A step, between whose nodal values 0, 0, 1 the polynomials of curved cells have -1/8."""
     step = ng.IfPos(ng.x - 0.1, 1.0, 0.0)

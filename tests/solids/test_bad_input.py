@@ -187,6 +187,16 @@ def two_boxes(first, second, **data):
     return Problem(geometry=mesh, materials={"a": SOFT, "b": SOFT}, displacement=held | data)
 
 
+def test_solids_drawn_with_two_dimensions():
+    """Which turns some of their faces inside out."""
+    cube = occ.Box((0, 0, 0), (1, 1, 1))
+    cube.solids.name, cube.faces.name = "cube", "side"
+    geometry = occ.OCCGeometry(occ.Compound([cube]), dim=2)
+    problem = Problem(geometry, materials={"cube": SOFT}, displacement={"side": (0, 0, 0)})
+    with pytest.raises(ValueError, match="as dim=2 turns faces inside out"):
+        solve(problem, maxh=0.7)
+
+
 def test_bodies_on_top_of_each_other():
     """Of the smaller one more than a half lies in the other; an interference does not."""
     for depth in (0.6, 1.0):
