@@ -6,7 +6,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
+from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, X, Y
 
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Problem, solve
@@ -338,3 +338,26 @@ def test_the_pressure_as_a_function(scene, order):
         secondary = solution.mesh.Boundaries(problem.contact[0].secondary)
         points = solution.mesh.MapToAllElements(ng.IntegrationRule([(0, 0, 0)], [1]), secondary)
         assert field(points).max() == pytest.approx(values.reshape(rows.shape)[:, -1].max())
+
+
+@pytest.mark.parametrize("start", [-3.0, 0.0])
+def test_a_guide_that_ends_on_a_line_makes_the_pressure_infinite(start):
+    """As of a block that a wall guides on a wider one; not on a line of symmetry of both."""
+    upper, lower = (
+        MoveTo(0, 0).Rectangle(2, 1).Face(),
+        MoveTo(start, -2).Rectangle(3 - start, 2).Face(),
+    )
+    for name, body in (("upper", upper), ("lower", lower)):
+        body.faces.name, body.edges.Min(X).name = name, f"{name}_left"
+        body.edges.Min(Y).name, body.edges.Max(Y).name = f"{name}_bottom", f"{name}_top"
+    problem = Problem(
+        geometry=OCCGeometry(Compound([upper, lower]), dim=2),
+        materials={"upper": Elastic(1.0, 0.3), "lower": Elastic(2.0, 0.3)},
+        displacement={"lower_bottom": (None, 0)},
+        sliding=["upper_left", "lower_left"],
+        traction={"upper_top": 0.01},
+        contact=[Contact("upper_bottom", "lower_top")],
+    )
+    places = solve(problem, maxh=0.5, order=2).quantities()["peak pressure"].infinite
+    expected = [(0, 0), (2, 0)] if start < 0 else [(2, 0)]
+    np.testing.assert_allclose(places[np.argsort(places[:, 0])], expected, atol=1e-9)

@@ -161,7 +161,9 @@ class Measured(Guaranteed):
         ]
         size, notes = float(np.abs(boundary.curve).max()), [reason]
         if along != "itself":
-            notes.insert(0, f"force along {along}, ({', '.join(f'{x:.4g}' for x in e.round(12) + 0.0)})")
+            notes.insert(
+                0, f"force along {along}, ({', '.join(f'{x:.4g}' for x in e.round(12) + 0.0)})"
+            )
         if proof is not None and proof.proof.dual.cells.curved.any():
             degree = boundary.geometry_order
             notes.append(f"guaranteed on the domain of the mesh, of curves of degree {degree}")

@@ -5,7 +5,9 @@ conditions on both sides determine (Williams 1952): 180 degrees where both are f
 held, 90 where one is guided and the other is free, held or guided, arcsin ((kappa + 1) / 4)^(1/2)
 where one is held and the other is free. In contact without friction both bodies count: a corner
 that presses on a line is one of 270 degrees in all. Of other moduli it is infinite at smaller
-angles, too.
+angles, too. Under a uniform pressure a side that is guided does not turn, and one that faces the
+end of contact by more than 90 degrees turns by a logarithm: the pressure is infinite there, unless
+the guide is a line of symmetry of both bodies.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from collections.abc import Callable, Sequence
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index, Mask, across
 from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace, boundary_corners, prescribed_components, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
@@ -59,6 +61,13 @@ def singular_corners(
     edge = (high == PRESSED) & ((low == FREE) | ((low == PRESSED) & (facing == np.pi)))
     critical[edge] = (np.pi - facing)[edge]
     uneven = edge & ~rigid & _turned_apart(problem, trace, place, body, np.array([angle, facing]))
+    guided = (high == PRESSED) & (low == GUIDED) & ~rigid & (facing > np.pi / 2 + STRAIGHT_TURN)
+    for i in np.flatnonzero(guided).tolist():
+        [side] = trace.curve[[first[i] if kind[first[i]] == GUIDED else second[i]]]
+        along = (side[-1] - side[0]) / np.linalg.norm(side[-1] - side[0])
+        beside = np.abs((place - place[i]) @ across(along)) > CORNER_DISTANCE * h[i]
+        ends = (body != body[i]) & (high == PRESSED) & (low == GUIDED) & ~beside
+        uneven[i] = not ends.any()
     straight = (low == high) & (np.abs(angle - np.pi) <= STRAIGHT_TURN)  # nothing changes
     found = ~straight & ((angle > critical + STRAIGHT_TURN) | uneven)
     size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
