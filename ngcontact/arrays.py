@@ -17,6 +17,7 @@ Array: TypeAlias = NDArray[np.float64]
 Index: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
 Integers: TypeAlias = NDArray[np.integer]
+Columns: TypeAlias = Array | sp.csr_array  # of many rows, sparse where most would be 0
 
 NEWTON_STEPS = 30
 
@@ -156,6 +157,11 @@ def newton(
         if moved <= rest:
             break
     return t
+
+
+def dense(matrix: Array | sp.sparray) -> Array:
+    """All entries (m, n) of a `matrix` (m, n) that may be sparse."""
+    return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())
 
 
 def for_components(S: sp.csr_array, d: int) -> sp.csr_array:

@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from .arrays import Array, Index, Mask, from_triplets, rows_of
+from .arrays import Array, Columns, Index, Mask, dense, from_triplets, rows_of
 
 ROW_DIFFERENCE = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 RING_CONDITION = 1e6  # condition number from which rows that refer to each other are dependent
@@ -99,8 +99,10 @@ class Rows:
         B.eliminate_zeros()
         return B
 
-    def left_sides(self, values: Array) -> Array:
+    def left_sides(self, values: Columns) -> Columns:
         """Left sides (m, r) of node `values` (d * n, r): x components first, then y."""
+        if sp.issparse(values):
+            return self.matrix @ values
         e, result = self.entries, np.zeros((len(self.node), values.shape[1]))
         at = values.reshape(self.direction.shape[1], -1, values.shape[1])[:, e.node]
         np.add.at(result, e.row, np.einsum("ki,ikr->kr", e.coefficient, at))
@@ -163,16 +165,22 @@ class BasisTransformation:
     kept: Index  # (k,) kept rows; the others are prescribed altogether and satisfied
     local: Array  # (n, d, d) from the values of a node to its unknowns, but for the rows
 
-    def coordinates(self, values: Array, rows: Array) -> Array:
+    def coordinates(self, values: Columns, rows: Columns) -> Columns:
         """Unknowns (d * n, r) of node `values` (d * n, r), `rows` (k, r) on the kept rows."""
         n, d, _ = self.local.shape
-        y = values.copy()
         at = np.flatnonzero((self.local != np.eye(d)).any(axis=(1, 2)))
-        here = at + n * np.arange(d)[:, None]
-        y[here] = np.einsum("nij,jnr->inr", self.local[at], values[here])
-        y[self.unknown] = rows
-        y[self.fixed] = 0.0
-        return y
+        here = (at + n * np.arange(d)[:, None]).ravel()
+        turned = dense(values[here]).reshape(d, len(at), values.shape[1])
+        turned = np.einsum("nij,jnr->inr", self.local[at], turned)
+        source = np.arange(d * n)  # among the rows of what follows, the last one 0
+        source[here] = d * n + np.arange(here.size)
+        source[self.unknown] = d * n + here.size + np.arange(len(self.unknown))
+        source[self.fixed] = -1
+        none = np.zeros((1, values.shape[1]))
+        every = [values, turned.reshape(here.size, values.shape[1]), rows, none]
+        if sp.issparse(values):
+            return sp.vstack(list(map(sp.csr_array, every)), format="csr")[source]
+        return np.concatenate(every)[source]
 
 
 @dataclass(frozen=True, eq=False)

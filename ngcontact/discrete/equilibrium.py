@@ -14,11 +14,12 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
+import scipy.sparse as sp
 from netgen.occ import OCCGeometry
 from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
-from ..arrays import Array, Index, Mask, across, rotations
+from ..arrays import Array, Columns, Index, Mask, across, dense, rotations
 from ..constraints import BasisTransformation, Conditions, Rows
 from ..errors import NoEquilibriumError
 from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
@@ -102,8 +103,8 @@ class FreeMotions:
     bodies: Bodies  # what moves
     # (m * b, r), of the translations and rotations, m = 3 or 6 in space, of each of b bodies
     combinations: Array
-    nodal: Array  # (d * n, r) node values, lengths
-    values: Array  # (d * N, r) unknowns of V_h
+    nodal: Columns  # (d * n, r) node values, lengths; sparse of several bodies
+    values: Columns  # (d * N, r) unknowns of V_h
 
     @property
     def of_bodies(self) -> Array:
@@ -120,22 +121,22 @@ class FreeMotions:
         """Work (r,) that a load `f` (d * N,) would do if all of it acted along the motions."""
         size = np.bincount(body_of_unknown(self.space, self.bodies), np.abs(f))
         body = self.of_bodies.any(axis=1).argmax(axis=0)  # each moves one body
-        return np.asarray(np.abs(self.values).max(axis=0) * size[body])
+        return np.asarray(_largest(self.values) * size[body])
 
     @cached_property
-    def means(self) -> Array:
+    def means(self) -> Columns:
         """Integrals (d * N, r) of v.z over the boundaries for the motions z, made on first use."""
         V, model = self.space.V, self.space.trace.model
         mass = ng.BilinearForm(V)
         u, v = V.TnT()
         mass += model.weighted(u.Trace() * v.Trace()) * ng.ds
         mass.Assemble()
-        return np.asarray(shared(mass.mat) @ self.values)
+        return shared(mass.mat) @ self.values
 
     @cached_property
     def gram(self) -> Array:
         """Integrals (r, r) of the products of the motions over the boundaries."""
-        return self.values.T @ self.means
+        return dense(self.values.T @ self.means)
 
     def motion(self, amounts: Array, multiplier: float = 0.0) -> RigidMotion:
         """One of the motions, by its `amounts` (r,)."""
@@ -178,26 +179,40 @@ def free_motions(
     free = [vanishing_combinations(resisted[at == b]) for b in range(len(bodies.names))]
     if not any(x.shape[1] for x in free):
         return None
-    of_bodies = [np.eye(len(motions))[:, rigid] @ x for x in free]
-    combinations, first = block_diag(*of_bodies), 0
+    combinations = block_diag(*(np.eye(len(motions))[:, rigid] @ x for x in free))
     own, of_unknown = _node_values(space, bodies), body_of_unknown(space, bodies)
     of_node = np.tile(of_unknown[: len(own) // trace.model.dim], trace.model.dim)
     own_values = space.basis @ own
-    own_forces = space.A @ own_values
-    nodal = np.zeros((len(own), combinations.shape[1]))
-    values = np.zeros((len(own_values), combinations.shape[1]))
-    for b, combination in enumerate(of_bodies):
-        columns = slice(first, first := first + combination.shape[1])
-        at_nodes, here = np.flatnonzero(of_node == b), np.flatnonzero(of_unknown == b)
-        nodal[at_nodes, columns] = own[at_nodes] @ combination
-        values[here, columns] = moved = own_values[here] @ combination
-        terms = (space.diagonal[here, None] * np.abs(moved)).max(axis=0)
-        if (np.abs(own_forces[here] @ combination).max(axis=0) > STRAIN_FORCE * terms).any():
-            raise ValueError(
-                "curved superparametric elements do not contain the rotation of a body that its "
-                'supports leave free; use element="isoparametric"'
-            )
+    nodal = _by_body(own, of_node, combinations)
+    values = _by_body(own_values, of_unknown, combinations)
+    forces = _by_body(space.A @ own_values, of_unknown, combinations)
+    terms = _largest(values * space.diagonal[:, None])
+    if (_largest(forces) > STRAIN_FORCE * terms).any():
+        raise ValueError(
+            "curved superparametric elements do not contain the rotation of a body that its "
+            'supports leave free; use element="isoparametric"'
+        )
     return FreeMotions(space, bodies, combinations, nodal, values)
+
+
+def _by_body(own: Array, body: Index, combinations: Array) -> Columns:
+    """Combinations (n, r) of what each `body` (n,) has of its `own` m motions (n, m).
+
+    Sparse where several bodies move, as their number would count twice.
+    """
+    n, m = own.shape
+    of_bodies = combinations.reshape(-1, m, combinations.shape[1])
+    moving = np.flatnonzero(of_bodies.any(axis=(1, 2)))
+    if len(moving) == 1:
+        return np.where((body == moving[0])[:, None], own @ of_bodies[moving[0]], 0.0)
+    column = m * body[:, None] + np.arange(m)
+    each = (own.ravel(), column.ravel(), np.arange(0, n * m + 1, m))
+    return sp.csr_array(each, (n, len(combinations))) @ sp.csr_array(combinations)
+
+
+def _largest(columns: Columns) -> Array:
+    """Largest size (r,) in each of the `columns` (n, r)."""
+    return dense(abs(columns).max(axis=0)).ravel()
 
 
 def _node_values(space: Space, bodies: Bodies) -> Array:
@@ -232,7 +247,7 @@ class Rigid:
     free: FreeMotions
     rows: Array  # (m, r) left sides of the contact rows, lengths
     work: Array  # (r,) of the load, before what quadrature left of it was taken out
-    motions: Array  # (d * n, r) in the unknowns of the program
+    motions: Columns  # (d * n, r) in the unknowns of the program
     null_space: NullSpace  # their part that no row resists, and the rest
     placing: Array  # (r,) amounts by which the load moves rigid bodies until contact stops them
     carries: Mask  # (m,) rows that would carry the load there
@@ -250,7 +265,7 @@ class Rigid:
         in its middle.
         """
         free, extent = self.free, np.abs(values).max(initial=0.0)
-        amounts = np.linalg.solve(free.nodal.T @ free.nodal, free.nodal.T @ values)
+        amounts = np.linalg.solve(dense(free.nodal.T @ free.nodal), free.nodal.T @ values)
         unresisted = vanishing_combinations(self.rows)
         amounts -= unresisted @ np.linalg.lstsq(unresisted, amounts)[0]
         for part in (free.combinations, *free.of_bodies):
@@ -291,8 +306,8 @@ def equilibrium(
     free = free_motions(space, conditions, model_of(problem).motions)
     if free is None:
         return None, space.f
-    f, work, left_sides = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
-    terms = np.abs(free.values).T @ np.abs(f)
+    f, work, of_rows = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
+    left_sides, terms = dense(of_rows), abs(free.values).T @ np.abs(f)
     noise = np.where(np.abs(work) <= WORK_ROUND_OFF * free.most_work(f), work, 0.0)
     unbalanced = _unbalanced(left_sides, rows.equality, work - noise)
     if not unbalanced.is_within(WORK_NOISE * terms):
@@ -301,9 +316,9 @@ def equilibrium(
     if left.any():  # Remark 3.7: without it the energy has no minimiser
         f = f - free.means @ np.linalg.solve(free.gram, left)
     placing, carries = _placing(left_sides, work - left, rows.g, rows.equality)
-    motions = basis.coordinates(free.nodal, left_sides)
+    motions = basis.coordinates(free.nodal, of_rows)
     unresisted = vanishing_combinations(left_sides)
-    means = np.zeros((len(motions), 0))
+    means = np.zeros((motions.shape[0], 0))
     if unresisted.size:  # the mean of such a motion over the boundary of the bodies vanishes
         means = basis.T.T @ (space.basis.T @ (free.means @ unresisted))
     null_space = pinned_null_space(motions, unresisted, means.T, basis.unknown, basis.fixed)

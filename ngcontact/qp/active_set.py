@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
-from ..arrays import Array, Factor, Mask, Solve
+from ..arrays import Array, Factor, Mask, Solve, dense
 from ..errors import ConvergenceError
 from .quadratic_program import (
     NULL_SPACE_TOLERANCE,
@@ -29,7 +29,6 @@ from .quadratic_program import (
     QuadraticProgram,
     SingularError,
     prescribing,
-    separated,
 )
 from .schur_complement import BorderedSystems
 
@@ -75,10 +74,11 @@ class ActiveSetIteration:
         held = np.zeros(pins.size, dtype=bool) if anchor is None else anchor.stiffness > 0
         if pins.size == 0 or held.all():
             return np.zeros(pins.size, dtype=bool)
-        motions = p.null_space.unresisted(np.concatenate([p.unknown[self.active], pins[held]]))
-        if (np.abs(p.b @ motions) > IDLE_WORK * (np.abs(p.b) @ np.abs(motions))).any():
+        at = np.concatenate([p.unknown[self.active], pins[held]])
+        combinations, (work, most) = p.null_space.unresisted(at), p.work
+        if (np.abs(work @ combinations) > IDLE_WORK * (most @ np.abs(combinations))).any():
             return None
-        return np.isin(pins, separated(motions, pins))
+        return p.null_space.held_by(combinations)
 
     def resisted(self) -> bool:
         """Whether the active rows resist all motions they can."""
@@ -114,7 +114,8 @@ class ActiveSetIteration:
         """
         p = self.systems.program
         null_space = p.null_space
-        motion = null_space.others @ np.linalg.solve(null_space.others[null_space.pins], moved)
+        at_pins = dense(null_space.others[null_space.pins])
+        motion = null_space.others @ np.linalg.solve(at_pins, moved)
         approach = np.where(self.active, 0.0, motion[p.unknown])
         meets = approach > NULL_SPACE_TOLERANCE * np.abs(moved).max()
         if not meets.any():

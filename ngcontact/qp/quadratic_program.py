@@ -15,8 +15,9 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import qr
+from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Columns, Index, Mask, dense
 
 NULL_SPACE_TOLERANCE = 1e-8  # singular value, of motions of size 1, below which nothing resists
 WEAK_RESISTANCE = 1e-2  # ... up to which rows resist so little that a factorisation loses digits
@@ -54,28 +55,34 @@ class NullSpace:
     """Rigid motions in the unknowns of a quadratic program."""
 
     lineal: Array  # (n, l) motions that no row resists
-    others: Array  # (n, q) the rest of the null space, zero at `held`
+    others: Columns  # (n, q) the rest of the null space, zero at `held`
     held: Index  # (l,) unknowns that fix the first
     pins: Index  # (q,) unknowns that fix the others
     conditions: Array  # (l, n) functionals that vanish at the result, the identity on `lineal`
 
     def resisted(self, rows: Index) -> bool:
         """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
-        part = self.others[rows]
-        if part.shape[1] == 0 or len(part) < part.shape[1]:
-            return part.shape[1] == 0
+        if self.pins.size == 0 or len(rows) < self.pins.size:
+            return self.pins.size == 0
+        part = dense(self.others[rows])
         least = np.linalg.svd(part, compute_uv=False)[-1]
         return bool(least > NULL_SPACE_TOLERANCE * np.sqrt(len(part)))
 
     def unresisted(self, rows: Index, tolerance: float = NULL_SPACE_TOLERANCE) -> Array:
-        """Motions (n, k) of `others` that rows with the unknowns `rows` (m,) do not resist."""
-        return self.others @ vanishing_combinations(self.others[rows], tolerance)
+        """Combinations (q, k) of `others` that rows with the unknowns `rows` (m,) do not resist."""
+        return vanishing_combinations(dense(self.others[rows]), tolerance)
+
+    def held_by(self, combinations: Array) -> Mask:
+        """Pins (q,), as many as `combinations` (q, k) of `others`, that hold these."""
+        at_pins, held = dense(self.others[self.pins]), np.zeros(self.pins.size, dtype=bool)
+        held[separated(at_pins @ combinations, np.arange(self.pins.size))] = True
+        return held
 
     def weakly_resisted(self, rows: Index) -> Mask:
         """Pins (q,) of the motions that rows with the unknowns `rows` (m,) hardly resist."""
         if self.pins.size == 0:
             return np.zeros(0, dtype=bool)
-        return np.isin(self.pins, separated(self.unresisted(rows, WEAK_RESISTANCE), self.pins))
+        return self.held_by(self.unresisted(rows, WEAK_RESISTANCE))
 
 
 def no_null_space(n: int) -> NullSpace:
@@ -85,7 +92,7 @@ def no_null_space(n: int) -> NullSpace:
 
 
 def pinned_null_space(
-    motions: Array, combinations: Array, functionals: Array, rows: Index, fixed: Mask
+    motions: Columns, combinations: Array, functionals: Array, rows: Index, fixed: Mask
 ) -> NullSpace:
     """Null space, by a basis `motions` (n, r) of size 1, with well separated pins.
 
@@ -99,18 +106,32 @@ def pinned_null_space(
     lineal[rows] = 0.0
     held = separated(lineal, places)
     # What completes the lineal motions, less what these contribute at the held unknowns.
-    every = np.arange(motions.shape[1])
+    every, kind = np.arange(motions.shape[1]), sp.csr_array if sp.issparse(motions) else np.asarray
     rest = motions[:, np.setdiff1d(every, separated(combinations, every))]
-    rest -= lineal @ np.linalg.solve(lineal[held], rest[held]) if held.size else 0.0
-    rest[held] = 0.0
-    pins = separated(rest, places)
+    if held.size:
+        rest = rest - kind(lineal) @ kind(np.linalg.solve(lineal[held], dense(rest[held])))
+        elsewhere = np.ones((len(fixed), 1))
+        elsewhere[held] = 0.0
+        rest = kind(rest * elsewhere)
+    pins = [held[:0]]
+    for part in _apart(rest):
+        at = np.intersect1d(places, part.nonzero()[0])
+        pins.append(at[separated(dense(part[at]), np.arange(at.size))])
     return NullSpace(
         lineal=lineal,
         others=rest,
         held=held,
-        pins=pins,
+        pins=np.concatenate(pins),
         conditions=np.asarray(np.linalg.solve(functionals @ lineal, functionals), dtype=float),
     )
+
+
+def _apart(columns: Columns) -> list[Columns]:
+    """Groups of sparse `columns` (n, q) that share no row with others, dense ones as they are."""
+    if not sp.issparse(columns):
+        return [columns]
+    _, group = connected_components(abs(columns).T @ abs(columns))
+    return [columns[:, group == k] for k in np.unique(group)]
 
 
 def separated(vectors: Array, places: Index) -> Index:
@@ -144,6 +165,12 @@ class QuadraticProgram:
     def diagonal(self) -> Array:
         """Diagonal (n,) of K."""
         return np.asarray(self.K.diagonal())
+
+    @cached_property
+    def work(self) -> tuple[Array, Array]:
+        """Work (q,) of the load on motions z that are not lineal, and the sum (q,) of its terms."""
+        motions = self.null_space.others
+        return motions.T @ self.b, abs(motions).T @ np.abs(self.b)
 
     @cached_property
     def unit_rows(self) -> bool:
