@@ -113,7 +113,8 @@ def _error_of_end(pair: ContactState, number: int) -> float:
 
     Near the end gap^(2/3) outside and p^2 inside are smooth in the length along the line. Where the
     line through the first two of either vanishes elsewhere, the discrete end is as uncertain; where
-    there are no two, or beyond the zone, the zone is.
+    there are no two, or beyond the zone, the zone is. Where contact only opens for a way, as beside
+    a corner that is closed, it is no more than that way.
     """
     x, ends = pair.line.position, pair.transitions
     closed, opened = ends.closed[number], ends.opened[number]
@@ -125,6 +126,8 @@ def _error_of_end(pair: ContactState, number: int) -> float:
     outside = step + distances_along(x[opened]) - ends.beyond[number]
     gap, squares = np.maximum(pair.gap[opened], 0.0) ** (2 / 3), pair.pressure[closed] ** 2
     zone, found = max(float(inside[-1]), step), []
+    if any(other[0] == opened[-1] for k, other in enumerate(ends.opened) if k != number):
+        zone = min(zone, step + float(distances_along(x[opened])[-1]))
     for t, y in ((outside, gap), (inside, squares)):
         line = len(t) > 1 and y[0] != y[1]
         zero = abs(t[0] - y[0] * (t[1] - t[0]) / (y[1] - y[0])) if line else zone
