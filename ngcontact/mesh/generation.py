@@ -339,7 +339,7 @@ def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float
     ]
     for contact in problem.contact:
         if contact.direction is None and not contact.bilateral:  # may come apart anywhere
-            for line in filter(None, (contact.secondary, contact.primary)):
+            for line in contact.sides:
                 for edge in _named(edges, line):
                     edge.maxh = min(edge.maxh, finer)
     _divide_facing(problem, edges, np.zeros((0, 2)))

@@ -175,9 +175,9 @@ def _bound(
     With `beside`, p* also has breaks there beside ends of segments, and cells are bisected where
     forces are rough.
     """
-    guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
+    guided = trace.segments(problem.guide)
     guided = guided[~trace.on_axis[guided]]  # the axis guides by itself: there u_r = 0
-    touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    touching = [name for pair in problem.contact for name in pair.sides]
     loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     fixed = [name for name, values in problem.displacement.items() if None not in values]
     degree = trace.order + LIFTING_DEGREES
@@ -307,14 +307,13 @@ def refuse_bound(problem: Problem, trace: BoundaryTrace, pairs: Sequence[Contact
         if refused.any():
             name = trace.mesh.GetBoundaries()[trace.region[refused.argmax()]]
             raise ValueError(f'{NO_BOUND} for {what}, as "{name}"; use error_estimate')
-    guides = () if problem.sliding is None else (str(problem.sliding),)
-    for pattern in (*problem.displacement, *problem.traction, *guides):
+    for pattern in (*problem.displacement, *problem.traction, problem.guide):
         if trace.inner[trace.segments(pattern)].any():
             raise ValueError(
                 f'{NO_BOUND} for conditions on a line inside a body, as on "{pattern}"'
             )
     for line, force in ((pair.line, pair.force) for pair in pairs):
-        loaded = (np.append(force, 0.0)[line.rows] != 0).any(axis=1)
+        loaded = (line.on_segments(force, 0.0) != 0).any(axis=1)
         ends = np.isin(line.rows, [-1, *line.rows[line.faces].ravel()]).all(axis=1)
         if line.contact.primary is None and (loaded & ~line.faces & ~ends).any():
             name = line.contact.secondary

@@ -89,6 +89,11 @@ class Cells:
         """Numbers (n,) of the material regions."""
         return MeshArrays(self.trace.mesh).bodies[self.parent]
 
+    @property
+    def lengths(self) -> Array:
+        """Lengths (k,) of the chords of sides."""
+        return np.linalg.norm(np.diff(self.vertices[self.ends], axis=1)[:, 0], axis=1)
+
     def on_side(self, side: Index, t: Array) -> tuple[Index, Array]:
         """Segments (k,) and parameters s, like `t`, of places `t` (k,) or (k, j) on `side` (k,)."""
         a, b = self.span[side].T.reshape(2, -1, *[1] * (t.ndim - 1))
@@ -342,7 +347,7 @@ def bisected(
     side, other, there = linked(cells)
     one, t = np.arange(len(cells.ends)), np.full(len(cells.ends), 0.5)
     one[other], t[other] = side, there
-    length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
+    length = cells.lengths
     length[cells.bent] *= CURVED_LENGTH
     rank, of = np.argsort(np.argsort(length, kind="stable")), one[cells.sides]  # no two are alike
     longest = of[np.arange(len(of)), rank[of].argmax(axis=1)]

@@ -182,7 +182,7 @@ def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
     It is higher at curved sides and beside contact along normals that are not those of the mesh.
     """
     pairs = [pair for pair in problem.contact if pair.direction is None]
-    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
+    names = [name for pair in pairs for name in pair.sides]
     side = np.tile(np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names))), 2)
     segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
     off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)

@@ -133,7 +133,7 @@ def pressure_support(
     line, found = pair.line, np.zeros((0, 3))
     if line.contact.bilateral or not len(line.segments):
         return PressureSupport(pair, line.segments, found)
-    nodes, active = trace.nodes[line.segments][:, [0, -1]], np.append(pair.active, False)[line.rows]
+    nodes, active = trace.nodes[line.segments][:, [0, -1]], line.on_segments(pair.active, False)
     near = np.asarray(np.isin(nodes, nodes[active.any(axis=1)]).any(axis=1))
     if len(rest := np.flatnonzero(~near)):
         local, span = np.arange(len(rest)), np.tile([0.0, 1.0], (len(rest), 1))
@@ -349,7 +349,7 @@ def facing_sides(
             )
     segment, s = cells.on_side(side, POINTS[None])
     ds = at_places(partial(jacobian, trace, contact), segment, s)
-    whole = np.append(pair.active, False)[line.rows].all(axis=1)
+    whole = line.on_segments(pair.active, False).all(axis=1)
     number, start, stop = reach.contact.T
     low, high = np.sort(cells.span[side], axis=1).T[..., None]
     inside = (
@@ -411,7 +411,7 @@ def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Ma
     that do not face as a whole.
     """
     number, every = np.arange(len(cells.vertices)), np.append(side, slots)
-    length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
+    length = cells.lengths
     beside = np.zeros(len(number))
     np.maximum.at(beside, cells.ends[side], length[side, None])
     narrow = length[every] < NARROW_SIDE * beside[cells.ends[every]].min(axis=1)

@@ -118,7 +118,7 @@ def lifting_of(
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     count = np.bincount(cells.sides[layer].ravel(), minlength=len(cells.ends))
-    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    lines = [name for pair in problem.contact for name in pair.sides]
     fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
     fixed[np.asarray(away, dtype=np.intp)] = False
     unit = np.concatenate(largest).max()
