@@ -115,7 +115,9 @@ def pinned_null_space(
         rest = kind(rest * elsewhere)
     pins = [held[:0]]
     for part in _apart(rest):
-        at = np.intersect1d(places, part.nonzero()[0])
+        moves = np.zeros(len(fixed), dtype=bool)
+        moves[part.nonzero()[0]] = True
+        at = places[moves[places]]
         pins.append(at[separated(dense(part[at]), np.arange(at.size))])
     return NullSpace(
         lineal=lineal,
@@ -135,12 +137,17 @@ def _apart(columns: Columns) -> list[Columns]:
 
 
 def separated(vectors: Array, places: Index) -> Index:
-    """Places (q,) among `places` (k,) at which the `vectors` (n, q) are most independent."""
-    count = vectors.shape[1]
-    if count == 0:
-        return np.zeros(0, dtype=np.intp)
-    places = places[vectors[places].any(axis=1)]
-    return places[qr(vectors[places].T, mode="r", pivoting=True)[1][:count]]
+    """Places (q,) among `places` (k,) at which the `vectors` (n, q) are most independent.
+
+    One after the other where most is left beside those before, as in a pivoted QR factorisation.
+    """
+    left, found = vectors[places], []
+    for _ in range(min(vectors.shape[1], places.size)):
+        pivot = int((left * left).sum(axis=1).argmax())
+        found.append(places[pivot])
+        along = left[pivot] / np.linalg.norm(left[pivot])
+        left = left - np.outer(left @ along, along)
+    return np.array(found, dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
