@@ -163,21 +163,20 @@ class BasisTransformation:
     values: Array  # (d * n,) their values
     unknown: Index  # (k,) unknown that equals the left side of each kept row
     kept: Index  # (k,) kept rows; the others are prescribed altogether and satisfied
-    local: Array  # (n, d, d) from the values of a node to its unknowns, but for the rows
+    nodes: Index  # (j,) nodes that a condition or a row concerns, rising
+    local: Array  # (j, d, d) from their values to their unknowns, but for the rows
 
     def coordinates(self, values: Columns, rows: Columns) -> Columns:
         """Unknowns (d * n, r) of node `values` (d * n, r), `rows` (k, r) on the kept rows."""
-        n, d, _ = self.local.shape
-        at = np.flatnonzero((self.local != np.eye(d)).any(axis=(1, 2)))
-        here = (at + n * np.arange(d)[:, None]).ravel()
-        turned = dense(values[here]).reshape(d, len(at), values.shape[1])
-        turned = np.einsum("nij,jnr->inr", self.local[at], turned)
-        source = np.arange(d * n)  # among the rows of what follows, the last one 0
-        source[here] = d * n + np.arange(here.size)
-        source[self.unknown] = d * n + here.size + np.arange(len(self.unknown))
+        (size, r), d = values.shape, self.local.shape[1]
+        here = (self.nodes + size // d * np.arange(d)[:, None]).ravel()
+        turned = dense(values[here]).reshape(d, -1, r)
+        turned = np.einsum("nij,jnr->inr", self.local, turned)
+        source = np.arange(size)  # among the rows of what follows, the last one 0
+        source[here] = size + np.arange(here.size)
+        source[self.unknown] = size + here.size + np.arange(len(self.unknown))
         source[self.fixed] = -1
-        none = np.zeros((1, values.shape[1]))
-        every = [values, turned.reshape(here.size, values.shape[1]), rows, none]
+        every = [values, turned.reshape(here.size, r), rows, np.zeros((1, r))]
         if sp.issparse(values):
             return sp.vstack(list(map(sp.csr_array, every)), format="csr")[source]
         return np.concatenate(every)[source]
@@ -219,8 +218,9 @@ class _Frames:
 
 @dataclass(frozen=True, eq=False)
 class _Supported:
-    """Supports at n nodes."""
+    """Supports at n nodes of a mesh."""
 
+    nodes: Index  # (n,) their numbers in the mesh, rising
     frames: _Frames  # whose first columns are the supported directions
     values: Array  # (n, d) prescribed along the columns
 
@@ -230,30 +230,43 @@ class _Supported:
         return np.arange(self.values.shape[1]) < self.frames.used[:, None]
 
 
-def _supported(n: int, c: Conditions) -> _Supported:
-    """The supports at n nodes that the conditions `c` make."""
-    d = c.direction.shape[1]
-    frames = _Frames(np.tile(np.eye(d), (n, 1, 1)), np.zeros(n, dtype=np.intp))
-    values, slot = np.zeros((n, d)), frames.take(c.node, c.direction)
+def _concerned(conditions: Conditions, rows: Rows) -> Index:
+    """Nodes (n,) that any condition or row concerns, rising: few of those of a mesh."""
+    return np.unique(np.append(conditions.node, rows.entries.node))
+
+
+def _axes(nodes: Index, d: int) -> Array:
+    """Frames (n, d, d) along the axes at so many nodes."""
+    return np.tile(np.eye(d), (len(nodes), 1, 1))
+
+
+def _supported(nodes: Index, c: Conditions) -> _Supported:
+    """The supports at the `nodes` (n,) that the conditions `c` make."""
+    d, node = c.direction.shape[1], np.searchsorted(nodes, c.node)
+    frames = _Frames(_axes(nodes, d), np.zeros(len(nodes), dtype=np.intp))
+    values, slot = np.zeros((len(nodes), d)), frames.take(node, c.direction)
     for k in range(d):  # values along the columns before are known
         at = slot == k
-        i = c.node[at]
+        i = node[at]
         parts = np.einsum("kij,ki->kj", frames.columns[i], c.direction[at])
         before = (parts[:, :k] * values[i, :k]).sum(axis=1)
         values[i, k] = (c.value[at] - before) / parts[:, k]
-    return _Supported(frames, values)
+    return _Supported(nodes, frames, values)
 
 
-def _preferred(rows: Rows, stiffness: Array) -> Index:
-    """Node (m,) of the secondary, or the nearest one that faces it where that is much softer."""
-    if rows.coupling.nnz == 0:
-        return rows.node
+def _preferred(rows: Rows, nodes: Index, stiffness: Array | None) -> Index:
+    """Node (m,) of the secondary, or the nearest one that faces it where that is much softer.
+
+    By its place among the `nodes` (n,).
+    """
+    if rows.coupling.nnz == 0 or stiffness is None:
+        return np.searchsorted(nodes, rows.node)
     coupling = rows.coupling.tocoo()
     rising = np.argsort(np.abs(coupling.data), kind="stable")
     facing = rows.node.copy()  # where nothing does
     facing[coupling.row[rising]] = coupling.col[rising]  # the largest comes last
     softer = STIFFNESS_CONTRAST * stiffness[facing] < stiffness[rows.node]
-    return np.where(softer, facing, rows.node)
+    return np.searchsorted(nodes, np.where(softer, facing, rows.node))
 
 
 def _hosts(preferred: Index, entries: Entries, frames: _Frames) -> tuple[Index, Index, Array]:
@@ -325,10 +338,14 @@ def _without_links(C: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
 
 
 def _in_frames(rows: Rows, supported: _Supported) -> tuple[Entries, Entries]:
-    """Entries of `rows` in the frames of the nodes, and what supports leave free of them."""
+    """Entries of `rows` in the frames of the n nodes, and what supports leave free of them.
+
+    They count by these nodes.
+    """
     e, fixed, frame = rows.entries, supported.fixed, supported.frames.columns
-    e = replace(e, coefficient=np.einsum("ki,kij->kj", e.coefficient, frame[e.node]))
-    return e, replace(e, coefficient=np.where(fixed[e.node], 0.0, e.coefficient))
+    node = np.searchsorted(supported.nodes, e.node)
+    e = Entries(e.row, node, np.einsum("ki,kij->kj", e.coefficient, frame[node]))
+    return e, replace(e, coefficient=np.where(fixed[node], 0.0, e.coefficient))
 
 
 def held_rows(conditions: Conditions, rows: Rows, length: float) -> Mask:
@@ -339,11 +356,10 @@ def held_rows(conditions: Conditions, rows: Rows, length: float) -> Mask:
     ValueError
         Prescribed displacements on both sides violate a row; an overlap as drawn is none here.
     """
-    n, m = rows.coupling.shape[1], len(rows.node)
-    supported = _supported(n, conditions)
+    m, supported = len(rows.node), _supported(_concerned(conditions, rows), conditions)
     e, free = _in_frames(rows, supported)
     size = np.linalg.norm(free.coefficient, axis=1)
-    own = e.node == rows.node[e.row]
+    own = rows.entries.node == rows.node[e.row]
     whole = (np.bincount(e.row, size > MIN_SINE, m) == 0) & (np.diff(rows.coupling.indptr) > 0)
     g = np.where(rows.equality, rows.g, np.maximum(rows.g, 0.0))
     _check_prescribed(replace(rows, g=g), e, supported, np.flatnonzero(whole), length)
@@ -366,47 +382,55 @@ def change_of_basis(
     ValueError
         Prescribed displacements on both sides violate a row, or rows depend on each other.
     """
-    n, d = rows.coupling.shape[1], rows.direction.shape[1]
-    supported = _supported(n, conditions)
+    (m, n), d = rows.coupling.shape, rows.direction.shape[1]
+    nodes = _concerned(conditions, rows)  # k of them, by whose numbers all but T counts
+    components = (nodes + n * np.arange(d)[:, None]).ravel()  # theirs among those of all nodes
+    supported = _supported(nodes, conditions)
     frame, fixed = supported.frames.columns, supported.fixed
     e, free = _in_frames(rows, supported)
-    taken = _Frames(np.tile(np.eye(d), (n, 1, 1)), supported.frames.used.copy())
-    preferred = _preferred(rows, np.ones(n) if stiffness is None else stiffness)
-    host, slot, local = _hosts(preferred, free, taken)
+    taken = _Frames(_axes(nodes, d), supported.frames.used.copy())
+    host, slot, local = _hosts(_preferred(rows, nodes, stiffness), free, taken)
     kept = (host >= 0).nonzero()[0]
     _check_prescribed(rows, e, supported, (host < 0).nonzero()[0], length)
     M = taken.columns.transpose(0, 2, 1).copy()
     M[host[kept], slot[kept]] = local[kept]
-    inverse = np.tile(np.eye(d), (n, 1, 1))
+    inverse = _axes(nodes, d)
     inverse[host[kept]] = np.linalg.inv(M[host[kept]])
     blocks = frame @ inverse
     # What rows contain beside the free values of their hosts moves to the right.
     own = (e.node == host[e.row])[:, None] & ~fixed[e.node]
     rest = np.einsum("ki,kij->kj", np.where(own, 0.0, e.coefficient), inverse[e.node])
     at, component = (rest * (host[e.row] >= 0)[:, None]).nonzero()
-    row, column, value = e.row[at], e.node[at] + n * component, rest[at, component]
-    unknown = host + n * slot
-    of_row = np.full(d * n, -1)
-    of_row[unknown[kept]] = kept
-    if (of_row[column] >= 0).any():  # unknowns of other rows
-        right = from_triplets(value, row, column, (len(host), d * n))
-        own_unknown = np.where(host >= 0, unknown, 0)
-        Y = _without_links(right[:, own_unknown].tocsr(), right).tocoo()
+    row, column, value = e.row[at], e.node[at] + len(nodes) * component, rest[at, component]
+    unknown = np.where(host >= 0, host + len(nodes) * slot, 0)
+    of_row = np.zeros(components.size, dtype=bool)
+    of_row[unknown[kept]] = True
+    if of_row[column].any():  # unknowns of other rows
+        right = from_triplets(value, row, column, (m, components.size))
+        Y = _without_links(right[:, unknown].tocsr(), right).tocoo()
         row, column, value = Y.row, Y.col, Y.data
+    column, unknown = components[column], components[unknown]
     node, i, j = blocks.nonzero()
-    k = np.arange(d)[:, None]
+    k, others = np.arange(d)[:, None], np.ones(d * n, dtype=bool)
+    others[components] = False
+    same = others.nonzero()[0]
     T = from_triplets(
-        np.append(blocks[node, i, j], -blocks[host[row], k, slot[row]] * value),
-        np.append(node + n * i, host[row] + n * k),
-        np.append(node + n * j, np.tile(column, d)),
+        np.concatenate(
+            [blocks[node, i, j], *(-blocks[host[row], k, slot[row]] * value), np.ones(same.size)]
+        ),
+        np.concatenate([nodes[node] + n * i, *(nodes[host[row]] + n * k), same]),
+        np.concatenate([nodes[node] + n * j, *[column] * d, same]),
         (d * n, d * n),
     )
+    prescribed, values = np.zeros(d * n, dtype=bool), np.zeros(d * n)
+    prescribed[components], values[components] = fixed.T.ravel(), supported.values.T.ravel()
     return BasisTransformation(
         T=T,
         links=Links(value, unknown[row], column),
-        fixed=fixed.T.ravel(),
-        values=supported.values.T.ravel(),
+        fixed=prescribed,
+        values=values,
         unknown=unknown[kept],
         kept=kept,
+        nodes=nodes,
         local=M @ frame.transpose(0, 2, 1),
     )

@@ -100,7 +100,18 @@ def _vertex_steps(parents: Integers, most: int) -> list[tuple[sp.csr_array, Inte
 
 
 def _inverse(T: sp.csr_array, d: int) -> sp.csr_array:
-    """Inverse of a change of basis: blocks of the nodes, and what rows contain of other nodes."""
+    """Inverse of a change of basis (d * n, d * n), which is the identity but at few nodes."""
+    n, same = T.shape[0] // d, sp.eye_array(T.shape[0], format="csr")
+    change = T - same
+    nodes = np.unique(change.tocoo().row % n)
+    here = (nodes + n * np.arange(d)[:, None]).ravel()
+    # With T = I + E C, where E are the columns `here` of I: I - E (C E + I)^-1 C.
+    there = _inverse_of_blocks(T[here][:, here], d) @ change[here]
+    return (same - same[:, here] @ there).tocsr()
+
+
+def _inverse_of_blocks(T: sp.csr_array, d: int) -> sp.csr_array:
+    """The same by blocks of the nodes, and what rows contain of other nodes."""
     n = T.shape[0] // d
     pairs = [(i, j) for i in range(d) for j in range(d)]
     parts = [T.diagonal((j - i) * n)[min(i, j) * n :][:n] for i, j in pairs]
