@@ -21,46 +21,6 @@ def partly_lifted():
     return cases.partly_opening_block()
 
 
-def glued():
-    """The same, bilateral: p* of either sign."""
-    pair = Contact("upper_contact", "lower_contact", bilateral=True)
-    displacement = {"bottom": (0, 0), "top": (0, -0.01)}
-    return replace(partly_lifted(), contact=[pair], traction={}, displacement=displacement)
-
-
-def two_pairs():
-    """Blocks pressed on each other and, by another pair, on a rigid floor."""
-    problem = partly_lifted()
-    pairs = [*problem.contact, Contact("bottom", gap=0.0)]
-    displacement = {"top|pressed": (0, -0.01)}
-    return replace(problem, traction={}, displacement=displacement, contact=pairs)
-
-
-SCENES = {
-    "rings": lambda: cases.ring_in_ring().problem,
-    "rigid plane": cases.disc_on_rigid_plane,
-    "bilateral": glued,
-    "two pairs": two_pairs,
-    "plane stress": lambda: replace(cases.flat_punch(), model="plane stress"),
-    "varying law": lambda: replace(
-        glued(), materials={"upper|lower": Elastic(1000 * (1.1 + ng.cos(6 * ng.x)), 0.3)}
-    ),
-}
-
-
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.filterwarnings("ignore:.*is not resolved")
-@pytest.mark.study(witness=["rigid plane"])
-def test_proved_bars_of_the_force_overlap(scene):
-    """Those of a coarse and of a fine solution contain the same value, the fine one is shorter."""
-    problem = SCENES[scene]()
-    coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.2, 0.12))
-    for pair in range(len(problem.contact)):
-        one, other = coarse.quantities(pair)["force"], fine.quantities(pair)["force"]
-        assert abs(one.value - other.value) <= one.proved + other.proved
-        assert other.proved < one.proved
-
-
 @pytest.mark.parametrize(("order", "h"), [(1, 0.2), (2, 0.2), (4, 0.2)])
 def test_a_force_at_a_clamped_end_counts_in_the_bar(order, h):
     """No row tells of the end of Gamma_K on Gamma_u; int (-x)^(1/2) from -1 to 0 is 2/3."""

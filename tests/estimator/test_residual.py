@@ -1,6 +1,5 @@
 """Error indicators: every part against its formula, effectivity, scales, where refinement goes."""
 
-import math
 from dataclasses import replace
 
 import ngsolve as ng
@@ -37,24 +36,6 @@ def test_effectivity_does_not_depend_on_the_contrast_of_moduli(contrast, order):
     solution = solve(case.problem, maxh=0.28, order=order)
     # Both relative to norms that differ by the discretisation error alone.
     assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, case.exact) <= 6
-
-
-@pytest.mark.parametrize("order", [1, 3])
-@pytest.mark.parametrize(
-    "make", [cases.one_transition, cases.curved_lines, cases.ring_in_ring, cases.polygonal_patch]
-)
-@pytest.mark.study(witness=["ring_in_ring-3", "ring_in_ring-1", "polygonal_patch-1"])
-def test_parts_are_not_negative_and_sum_to_the_squares(make, order):
-    solution = solve(make().problem, maxh=0.4, order=order)
-    parts = solution.estimate_parts
-    assert min(part.min() for part in parts.values()) >= 0
-    assert solution.indicators**2 == pytest.approx(sum(parts.values()), rel=1e-13)
-    total = math.sqrt((solution.indicators**2).sum())
-    assert solution.error_estimate == pytest.approx(total, rel=1e-14)
-    u = solution.displacement.vec.FV().NumPy()
-    norm = math.sqrt(solution.discrete.space.energy(u))
-    # Two quadratures of one norm, which differ on coarse curved elements: measured 1e-5.
-    assert solution.relative_error_estimate == pytest.approx(total / norm, rel=1e-4)
 
 
 @pytest.fixture(scope="module")

@@ -72,49 +72,6 @@ def consistent(cells):
     np.testing.assert_allclose(spans[outer], 1.0, rtol=ROUND_OFF)
 
 
-def test_a_mesh_that_nothing_divides():
-    trace = boundary_trace(square(), 1)
-    cells = cells_of(trace, NO_CUTS)
-    consistent(cells)
-    assert len(cells.triangles) == trace.mesh.ne
-    np.testing.assert_array_equal(np.sort(cells.parent), np.arange(trace.mesh.ne))
-    assert moment(cells, lambda x: x[:, 0] ** 2 * x[:, 1]) == pytest.approx(1 / 6, rel=ROUND_OFF)
-
-
-@pytest.mark.parametrize("cuts", [[0.25], [0.1, 0.5, 0.9]])
-def test_cuts_are_vertices(cuts):
-    """Of one segment: a fan of the triangle behind it, as many triangles more as there are cuts."""
-    trace = boundary_trace(square(), 1)
-    k = int(trace.segments("top")[0])
-    cells = cells_of(trace, (np.full(len(cuts), k), np.array(cuts)))
-    consistent(cells)
-    assert len(cells.triangles) == trace.mesh.ne + len(cuts)
-    new = cells.vertices[trace.mesh.nv :]
-    places = trace.point(np.full(len(cuts), k), np.array(cuts))
-    np.testing.assert_allclose(np.sort(new, axis=0), np.sort(places, axis=0))
-    parts = cells.span[cells.segment == k]
-    np.testing.assert_allclose(np.unique(parts), [0.0, *cuts, 1.0])
-    s = np.array([*cuts, 1.0]) - 1e-3  # each place lies on the side that ends there
-    own = cells.side_at(np.full(len(s), k), s)
-    t = cells.own_parameter(own, s[:, None])
-    assert len(np.unique(own)) == len(s)
-    assert ((t > 0) & (t < 1)).all()
-    np.testing.assert_allclose(cells.on_side(own, t[:, 0])[1], s, rtol=ROUND_OFF)
-
-
-def test_triangles_are_parted_where_tractions_depend_on_each_other():
-    """A corner of one triangle with tractions on both sides, unless the vertex is held."""
-    trace = boundary_trace(square(1), 1)
-    every = np.arange(len(trace.region))
-    mesh = trace.mesh.ne
-    # Diagonal from (0, 0) to (1, 1): one triangle each at (1, 0) and (0, 1).
-    assert len(divided(trace, every, NONE).triangles) == mesh + 4
-    assert len(divided(trace, trace.segments("top|left"), NONE).triangles) > mesh
-    assert len(divided(trace, trace.segments("right|bottom"), every).triangles) == mesh
-    assert len(cells_of(trace, NO_CUTS).triangles) == mesh
-    consistent(divided(trace, every, NONE))
-
-
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_curved_triangles(order):
     """Area and moment are those of the domain of the mesh, by Green's formula on its boundary."""

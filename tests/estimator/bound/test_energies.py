@@ -174,32 +174,6 @@ def test_dual_rows_on_both_sides_of_a_corner(slope):
         assert error - fine.error_bound <= solution.error_bound <= 2 * error
 
 
-def test_loads_that_are_no_polynomials_about_an_axis():
-    """Off the axis they enter with constants of the triangles."""
-
-    def loaded(inner):
-        return Problem(
-            geometry=axisymmetric_cases.cylinders(inner),
-            materials={"upper|lower": cases.FIRST},
-            displacement={"top|bottom": (None, 0)},
-            traction={"upper_side": (0, ng.sin(9 * ng.y))},
-            force={"upper|lower": (ng.x * ng.y, ng.exp(3 * ng.x * ng.y))},
-            contact=[],
-            model="axisymmetric",
-        )
-
-    solution = solve(loaded(0.5), maxh=0.3, order=2)
-    finer = solve(loaded(0.5), maxh=0.1, order=3)
-    settled(solution)
-    assert solution.bound_parts["loads"] > 0
-    low, high = solution.energy_bounds
-    assert low <= finer.energy_bounds[1]
-    assert finer.energy_bounds[0] <= high
-    assert solution.error_bound**2 >= 2 * (solution.energy - finer.energy_bounds[1])
-    with pytest.raises(ValueError, match="loads that are no polynomials at the axis"):
-        solve(loaded(0.0), maxh=0.3, order=2).error_bound  # noqa: B018
-
-
 def test_no_loads_no_error():
     problem = Problem(
         geometry=blocks(),

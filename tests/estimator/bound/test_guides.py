@@ -92,25 +92,6 @@ def test_a_ring_that_turns_freely():
         assert 1 <= solution.error_bound / energy_error(solution, exact)[0] <= 1.1
 
 
-@pytest.mark.parametrize(("guided", "row"), [("rim", "auto"), ("hole", "auto"), ("rim", "dual")])
-@pytest.mark.study
-def test_rings_in_contact_and_guided(guided, row):
-    """Curved contact beside a curved guide, which a stiffer bearing approaches."""
-    problem = cases.ring_in_ring().problem
-    problem = replace(
-        problem,
-        traction={"hole" if guided == "rim" else "rim": SQUEEZE},
-        sliding=f"{problem.sliding}|{guided}",
-        contact=[replace(pair, rows=row) for pair in problem.contact],
-    )
-    *_, fine = adapt(problem, order=4, max_dofs=7000)
-    overkill = Overkill(fine)
-    for solution in adapt(problem, order=2, max_dofs=1800):
-        settled(solution)
-        error = overkill.relative_error(solution) * fine.energy_norm
-        assert error - fine.error_bound <= solution.error_bound <= 1.5 * error
-
-
 def half_ellipse(angle=0.0):
     """Half an ellipse in its bearing, clamped at the cut, under its weight and a thrust."""
     shape = WorkPlane().Ellipse(1.0, 0.6).Face() * WorkPlane().MoveTo(0, -2).Rectangle(3, 4).Face()

@@ -8,7 +8,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.reference import cases
+from drivers.reference import axisymmetric_cases, cases
 from ngcontact import ContactError, ContactWarning, solve
 from tests.given_meshes import two_blocks
 
@@ -18,6 +18,13 @@ def test_curves_that_meet_the_axis():
     solution = solve(problem, maxh=0.5, order=2)
     with pytest.raises(ValueError, match='curves that meet the axis, as "arc"'):
         _ = solution.error_bound
+
+
+def test_loads_that_are_no_polynomials_at_the_axis():
+    load = {"upper|lower": (0, -ng.exp(3 * ng.x * ng.y))}
+    problem = replace(axisymmetric_cases.pressed_cylinders(), traction={}, force=load)
+    with pytest.raises(ValueError, match="loads that are no polynomials at the axis"):
+        _ = solve(problem, maxh=0.5, order=2).error_bound
 
 
 def test_jumping_displacements_have_no_energy():
