@@ -15,8 +15,6 @@ from ngcontact.mesh import first_mesh
 from ngcontact.problem import MeshArrays
 
 AS_IT_IS = Motion("as it is")
-# On the curve, or at the points, of the secondary: not the same when the bodies are swapped.
-ON_SECONDARY = ("estimate", "indicators", "relative", "transitions")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,38 +122,22 @@ def posed(scene: Scene, motion: Motion) -> tuple[Problem, np.ndarray, np.ndarray
     return moved, vertex, triangle
 
 
-def swapped(scene: Scene) -> Scene:
-    """The facing side carries the contact points."""
-    pair = scene.contact
-    direction = None if pair.direction is None else tuple(-np.array(pair.direction))
-    pair = replace(pair, secondary=str(pair.primary), primary=pair.secondary, direction=direction)
-    return replace(scene, problem=replace(scene.problem, contact=[pair]))
-
-
 def nodal(solution):
     """Displacements (nv, 2) of the vertices."""
     return solution.displacement.vec.FV().NumPy().reshape(2, -1)[:, : solution.mesh.nv].T
 
 
-def same_points(first, other, motion, exchanged):
-    """Numbers in both solutions of the contact points that are the same.
-
-    Of swapped bodies they are so if they face each other; means are taken on the secondary.
-    """
+def same_points(first, other, motion):
+    """Numbers in both solutions of the contact points that are the same."""
     origin, size = first.points[:1], np.ptp(first.points, axis=0).max()
     x = (motion.place(first.points) - motion.place(origin)) / (motion.length * size)
     y = (other.points - motion.place(origin)) / (motion.length * size)
     here, there = (
         np.concatenate([pair.line.direction for pair in s.pairs]) for s in (first, other)
     )
-    here = here @ motion.turn.T * (-1 if exchanged else 1)
-    if exchanged and other.problem.contact[0].direction is not None:  # only the place across it
-        x, y = (z - (z * there[0]).sum(axis=1)[:, None] * there[0] for z in (x, y))
-    distance, number = cKDTree(np.column_stack([y, there])).query(np.column_stack([x, here]))
+    tree = cKDTree(np.column_stack([y, there]))
+    distance, number = tree.query(np.column_stack([x, here @ motion.turn.T]))
     same = np.flatnonzero(distance < 1e-6)
-    if exchanged:
-        means = [np.concatenate([pair.line.means for pair in s.pairs]) for s in (first, other)]
-        same = same[~(means[0][same] | means[1][number[same]])]
     return same, number[same]
 
 
@@ -173,21 +155,15 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
 
     Infinite where active sets, steps or the number of transitions differ.
     """
-    exchanged = first.problem.contact[0].secondary != other.problem.contact[0].secondary
-    same, number = same_points(first, other, motion, exchanged)
-    if exchanged:  # only points without force may have no counterpart
-        counts = np.count_nonzero(first.active), np.count_nonzero(other.active)
-        complete = counts == (first.active[same].sum(), other.active[np.unique(number)].sum())
-    else:
-        complete = len(same) == len(np.unique(number)) == len(first.points) == len(other.points)
+    same, number = same_points(first, other, motion)
+    complete = len(same) == len(np.unique(number)) == len(first.points) == len(other.points)
     size, modulus = motion.length * motion.load, motion.modulus
     force, root = modulus * motion.load * motion.length, math.sqrt(modulus)
-    sign = -1 if exchanged else 1
     u = np.abs(nodal(first)).max()
     pushed = first.contact_force()
     # Coordinates that are rounded otherwise, and gaps that are data, decide otherwise which points
     # are the nearest.
-    rounded = np.abs(motion.shift).max() > 1 or motion.load != 1 or exchanged
+    rounded = np.abs(motion.shift).max() > 1 or motion.load != 1
     scaled = first.energy * force * size  # beyond the range of numbers 0 or infinite
 
     def off(value, image, scale):
@@ -204,9 +180,7 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
             first.pressure.max(),
         ),
         "gap": off(other.gap[number] / size, first.gap[same], max(u, first.gap.max())),
-        "force": off(
-            sign * other.contact_force() / force, pushed @ motion.turn.T, np.linalg.norm(pushed)
-        ),
+        "force": off(other.contact_force() / force, pushed @ motion.turn.T, np.linalg.norm(pushed)),
         "reactions": max(
             off(other.reactions[name] / force, ours @ motion.turn.T, np.linalg.norm(pushed))
             for name, ours in first.reactions.items()
@@ -222,8 +196,4 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
             first.transitions(), other.transitions(), motion, np.ptp(first.points, axis=0).max()
         ),
     }
-    return {
-        name: value if value == value else math.inf
-        for name, value in found.items()
-        if not (exchanged and name in ON_SECONDARY)
-    }
+    return {name: value if value == value else math.inf for name, value in found.items()}

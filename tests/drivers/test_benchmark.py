@@ -2,7 +2,6 @@
 
 import ast
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -78,18 +77,6 @@ def test_kratos_finds_the_references_or_is_missing_by_name():
 def test_a_missing_package_is_named():
     with pytest.raises(NotInstalledError, match=r"Nothing needs no_such_code.*bench"):
         needed("Nothing", "math", "no_such_code")
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", COMMON)
-@pytest.mark.study(witness=["block-2"])
-def test_energy_converges_on_graded_meshes(name: str, order: int):
-    engine = replace(ngsolve.ACTIVE_SET, orders=(order,))
-    runs = list(engine.runs(COMMON[name], ["graded"], (500, 2000, 8000)))
-    sizes = np.log([run.unknowns for run in runs])
-    rate, _ = np.polyfit(sizes, np.log([errors(run)["energy"] for run in runs]), 1)
-    # Theory: -order, on ideal meshes; measured -1.0 to -1.1 and -1.9 to -2.1.
-    assert -order - 0.3 < rate < -order + 0.3
 
 
 @pytest.mark.parametrize("name", COMMON)
@@ -177,15 +164,6 @@ def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.Captur
 
 def test_every_part_has_its_name():
     assert get_args(Part) == tuple(PARTS)
-
-
-@pytest.mark.study
-def test_one_size_grows_by_no_exponent():
-    rows = [processes.measure("block", 1, 1000, kind) for kind in ("linear", "contact")]
-    assert "exponent" not in processes.of_growth(rows)
-    assert "exponent" in processes.of_growth(
-        [*rows, *(replace(row, unknowns=9000) for row in rows)]
-    )
 
 
 def test_every_stage_of_a_level_is_found():

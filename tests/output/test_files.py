@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
-from vtkmodules.vtkCommonDataModel import vtkHigherOrderTriangle
 
 from ngcontact import plot_convergence, write_film
 from ngcontact.fem import von_mises
 from ngcontact.output import slope_triangle
 from ngcontact.output.files import check_path, replacing
-from ngcontact.output.nodes import lattice
 from tests.output.stubs import stub
 
 
@@ -74,16 +72,6 @@ def test_the_triangle_has_the_slope(above):
     (x0, y0), (x1, y1) = line.get_xydata()[:2]  # its long side
     assert np.log(y1 / y0) / np.log(x1 / x0) == pytest.approx(-1.5)
     assert (y1 > x1**-1.5) == above
-
-
-@pytest.mark.parametrize("order", range(1, 7))
-def test_node_order_is_that_of_vtk(order):
-    expected = []
-    for k in range((order + 1) * (order + 2) // 2):
-        index = [0, 0, 0]
-        vtkHigherOrderTriangle.BarycentricIndex(k, index, order)
-        expected.append([index[2], index[0], index[1]])  # VTK counts from the third corner
-    assert lattice(order).tolist() == expected
 
 
 def test_von_mises_of_large_stresses():

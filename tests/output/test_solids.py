@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import pyvista
 
-from ngcontact import Elastic, solve, write_series
+from ngcontact import Elastic, solve
 from ngcontact.geometries import shells
 from ngcontact.output.nodes import nodes_of
 from ngcontact.output.surface import contact_surface
@@ -104,13 +104,6 @@ def test_a_linear_function_on_the_surface_is_kept():
     np.testing.assert_allclose(found[near], exact[near], atol=0.01)
     assert known[surface.row >= 0].all()
     assert not known.all()  # the ball's rim faces nothing
-
-
-def test_a_series_of_levels(tmp_path):
-    write_series(tmp_path / "load.pvd", [pressed_cube(1), pressed_cube(2)], times=[0, 1])
-    series = pyvista.get_reader(tmp_path / "load.pvd")
-    assert series.time_values == [0, 1]
-    assert (tmp_path / "load_001_contact.vtp").exists()
 
 
 def test_nothing_in_contact_is_an_empty_file(tmp_path):

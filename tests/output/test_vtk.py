@@ -100,8 +100,14 @@ def test_contact_points_carry_their_values(tmp_path):
     assert sorted(links.tolist()) == [[k, k + 1] for k in range(8)]
 
 
-def test_series_lists_levels_with_both_files(tmp_path):
-    path = write_series(tmp_path / "run & more.pvd", (stub(p) for p in (1, 2)))
+def test_series_lists_levels_with_both_files_also_where_it_is_interrupted(tmp_path):
+    def levels():
+        yield from map(stub, (1, 2))
+        raise KeyboardInterrupt
+
+    path = tmp_path / "run & more.pvd"
+    with pytest.raises(KeyboardInterrupt):
+        write_series(path, levels())
     reader = pyvista.PVDReader(path)
     assert reader.time_values == [0.0, 1.0]
     listed = {(d.time, d.part): d.path for d in reader.datasets}

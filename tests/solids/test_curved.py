@@ -44,7 +44,7 @@ def unmatched(one, other, held=()):
 
 @pytest.mark.parametrize("secondary", ["inner_contact", "outer_contact"])
 def test_of_shells_with_equal_facets_the_convex_side_is_secondary(secondary):
-    mesh = ng.Mesh(shells().GenerateMesh(maxh=0.2))
+    mesh = ng.Mesh(shells().GenerateMesh(maxh=0.4))
     pair = Contact("inner_contact", "outer_contact", roles="auto")
     pair = pair if pair.secondary == secondary else pair.swapped()
     assert with_roles(boundary_trace(mesh, 1), pair).secondary == "inner_contact"
@@ -68,14 +68,6 @@ def test_press_fit_of_identified_faces(order, maxh, mean, rms):
     assert errors(solution)[1] < rms
     [x, y, z] = solution.contact_force() / (-math.pi / 4 * PRESSURE)
     assert max(abs(x - y), abs(y - z)) < 1e-2
-
-
-@pytest.mark.parametrize(("order", "sizes", "mean", "rms"), [(3, (0.25, 0.3), 4e-4, 1.5e-2)])
-def test_press_fit_of_any_meshes(order, sizes, mean, rms):
-    """Measured: 2.3e-4 and 9.1e-3."""
-    solution = solve(press_fit(unmatched(*sizes)), order=order)
-    assert errors(solution)[0] < mean
-    assert errors(solution)[1] < rms
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,13 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.reference.solids import hertz_of_solids
+from drivers.reference.solids import hertz_of_solids, relative_energy_error
 from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.fem import unknowns
 from ngcontact.geometries.solids import shells
 from tests.solids.meshes import boxes
 from tests.solids.test_curved import PRESSURE, press_fit, unmatched
-from tests.solids.test_patch import SIDES, TURN, blocks, pressed
+from tests.solids.test_patch import TURN, blocks, pressed
 
 HERTZ, EXACT = hertz_of_solids()
 RADIUS, PEAK, FORCE = EXACT.a, EXACT.p0, EXACT.P / 4  # of a quarter
@@ -67,6 +68,20 @@ def test_pressure_field_of_hertz_contact(levels, order, rms):
     assert total == pytest.approx(solution.force.sum(), rel=1e-10)
 
 
+def test_levels(levels):
+    """Effectivity: measured 4.5 to 4.8 on all but the first."""
+    run = levels[2]
+    for level in run[1:]:
+        error = relative_energy_error(level, EXACT)
+        assert 3 < level.relative_error_estimate / error < 8
+    assert error < 6e-2  # measured
+    assert (np.diff([level.relative_error_estimate for level in run]) < 0).all()
+    assert all(level.work["gap_searches"] == 0 for level in run)  # nodes face nodes
+    # Bisection leaves edges of no element in NGSolve's count of edges.
+    sizes = [level.displacement.space.ndof for level in run]
+    assert sizes == [unknowns(level.mesh, 2, "isoparametric") for level in run]
+
+
 def test_quantities(levels):
     """Without errors of one level; with the larger of two differences of three."""
     assert all(row.kind == "none" and math.isnan(row.error) for row in levels[2][1].quantities())
@@ -89,25 +104,6 @@ def test_quantities(levels):
     assert last["energy"].value == levels[2][-1].energy
     assert np.linalg.norm(last["peak pressure"].place) < RADIUS / 4
     assert "larger of the last two differences" in str(last)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.parametrize("secondary", SIDES)
-@pytest.mark.parametrize("counts", [(2, 2), (3, 2)])
-def test_uniform_pressure(order, secondary, counts):
-    """All of both faces: nothing ends, exact values, with a direction and along normals."""
-    mesh = blocks(*counts, turn=TURN)
-    for direction in (True, False):
-        solution = solve(pressed(mesh, secondary, direction, turn=TURN), order=order)
-        assert solution.transitions() == []
-        assert solution.contact_area() == pytest.approx(1.0, rel=1e-12)
-        field, name = solution.pressure_field(), SIDES[secondary][0]
-        miss = ng.Integrate((field - 1) ** 2 * ng.ds(name), mesh)
-        assert math.sqrt(miss) < 1e-10
-        assert ng.Integrate(field * ng.ds, mesh) == pytest.approx(1.0, rel=1e-10)  # 0 elsewhere
-        rows = solution.quantities()
-        for key in ("force", "contact area", "mean pressure", "peak pressure"):
-            assert rows[key].value == pytest.approx(1.0, rel=1e-10)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
