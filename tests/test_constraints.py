@@ -149,29 +149,6 @@ def test_corner_has_two_rows_at_one_node():
         assert sorted(basis.unknown.tolist()) == [0, 2]
 
 
-def test_one_sided_support_puts_the_row_on_the_other_side():
-    contact = rows(4, (0, unit(-1.2), {1: 0.3, 2: 0.7}), (3, unit(-1.3), {2: 1.0}))
-    basis = check(conditions(*clamped(0, 0.02, -0.01)), contact)
-    assert basis.kept.tolist() == [0, 1]
-    assert basis.unknown[0] % 4 == 2  # the larger share
-    # The same with the primary prescribed: the row stays where it was.
-    basis = check(conditions(*clamped(1, 1, 2), *clamped(2, 3, 4)), contact)
-    assert basis.unknown.tolist() == [0, 3]
-
-
-def test_guided_contact_node_has_one_free_direction():
-    """Gamma_0 ends on Gamma_K: across it nothing moves, along it the row has its unknown."""
-    contact = rows(2, (0, (0, -1), {1: 1.0}))
-    basis = check(conditions((0, X, 0.0), (1, X, 0.0)), contact)
-    assert basis.unknown.tolist() == [2]
-    # Slanted: the row's direction is not the free one.
-    basis = check(conditions((0, unit(0.4), 0.3), (1, unit(0.4), 0.0)), contact)
-    assert basis.unknown.tolist() == [2]
-    # The free direction is along the line: the row goes to the partner.
-    basis = check(conditions((0, Y, 0.3)), contact)
-    assert basis.unknown.tolist() == [1]
-
-
 def test_row_moves_where_its_share_of_the_free_direction_is_small():
     def host(share, *more):
         d = np.array([share, -np.sqrt(1 - share**2)])

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane, X
+from netgen.occ import Compound, OCCGeometry, WorkPlane
 
 from drivers.reference.straight import energy_error
 from drivers.stress.motion import Motion, moved_mesh
@@ -88,38 +88,6 @@ def test_segments_of_a_given_mesh_may_run_either_way(order):
 
 def plate(below="side"):
     return rectangle("body", (0, 4), (0, 3), (below, "side", "side", "side"))
-
-
-def l_shape():
-    return plate() - rectangle("hole", (2, 4.5), (1, 3.5), "loaded")
-
-
-def cut_twice():
-    body = plate() - rectangle("hole", (1, 2), (1, 2), "loaded")
-    return body - WorkPlane().MoveTo(2, 1.5).Circle(0.7).Face()
-
-
-RESULTANTS = {l_shape: (-2, -2), cut_twice: None}  # of the pressure 1 on "loaded"
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("make", RESULTANTS)
-def test_reactions_balance_loads_on_cuts(make, order):
-    shape = make()
-    shape.edges.Min(X).name = "held"
-    problem = Problem(
-        OCCGeometry(shape, dim=2), {"body": STEEL}, {"held": (0, 0)}, traction={"loaded": PRESSURE}
-    )
-    solution = solve(problem, maxh=0.5, order=order)
-    trace = solution.discrete.space.trace
-    segments = trace.segments("loaded")  # straight
-    normals = trace.normal(segments, np.full(len(segments), 0.5))
-    load = -PRESSURE * trace.lengths(segments) @ normals
-    scale = PRESSURE * trace.lengths(segments).sum()
-    assert solution.reactions["held"] + load == pytest.approx([0, 0], abs=1e-12 * scale)
-    if RESULTANTS[make] is not None:
-        expected = PRESSURE * np.array(RESULTANTS[make])
-        assert load == pytest.approx(expected, abs=1e-12 * scale)
 
 
 def test_a_cut_that_takes_nothing_away_is_told():

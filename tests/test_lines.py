@@ -13,7 +13,6 @@ corners where contact ends in tests/contact/test_state.py.
 
 import math
 from dataclasses import replace
-from itertools import product
 
 import ngsolve as ng
 import numpy as np
@@ -64,32 +63,6 @@ def touching(mesh, exact, where=OUTSIDE):
 
 # --- gaps next to zero, and contact without strict complementarity ---
 
-CONTINUOUS = {
-    "closed": cases.pressure_patch,
-    "one end": cases.clamped_transition,
-    "two ends": cases.hertz_contact,
-}
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", CONTINUOUS)
-def test_the_solution_moves_by_no_more_than_the_gap(name, order):
-    problem = CONTINUOUS[name]().problem
-    [pair] = problem.contact
-
-    def shifted(gap):
-        gap = (0.0 if pair.gap is None else pair.gap) + gap
-        return solved(replace(problem, contact=[replace(pair, gap=gap)]), maxh=0.25, order=order)
-
-    zero = shifted(0.0)
-    for gap in (TINY, -TINY):
-        s = shifted(gap)
-        # One body takes up the whole gap at most; 0.73 to 0.88 measured.
-        assert moved(s, zero) <= TINY
-        # Moduli and mesh size of 1 to 3 and 1/4: 0.9 to 2.4 measured.
-        assert np.abs(s.pressure - zero.pressure).max() <= 5 * TINY
-
 
 def stacked(gap, base):
     """Two blocks 2 by 1 that part at y = `base`, with a distance between them; names of blocks."""
@@ -138,27 +111,6 @@ def half_at_rest(cells):
     return Case(touching(mesh, exact), exact)
 
 
-DEGENERATE = [  # case, mesh size, order, and the error over the best that is allowed
-    # 0.98 to 1.02 measured
-    *((cases.curved_lines, h, p, 1.05) for p, h in product((1, 2, 3), (0.15, 0.08))),
-    # A vertex or a midpoint at the end. Order 1: 1 by theory. Order 2: 0.91 to 0.99 measured.
-    *((cases.one_transition, h, p, 1.0) for p, h in ((1, 0.25), (2, 0.25), (2, 2 / 7))),
-    # by theory; 0.99 to 1.001 measured
-    *((lambda n=n: half_at_rest(n), None, 1, 1.0) for n in (16, 32, 33)),
-    *((lambda n=n: half_at_rest(n), None, 2, 1.05) for n in (16, 32, 33)),
-]
-
-
-@pytest.mark.study
-@pytest.mark.parametrize(("make", "maxh", "order", "allowed"), DEGENERATE)
-def test_pressure_and_gap_that_vanish_together(make, maxh, order, allowed):
-    """At the end of the contact, or on half of it."""
-    case = make()
-    s = solved(case.problem, maxh=maxh, order=order)
-    assert over_the_best(s, case.exact) <= allowed
-    assert len(s.steps) <= MOST_STEPS
-
-
 @pytest.mark.parametrize("order", [2, 3, 4])
 def test_pressure_that_vanishes_is_exact(order):
     """At one end (order 2), or on half of the zone: the displacement lies in V_h."""
@@ -171,7 +123,7 @@ def test_pressure_that_vanishes_is_exact(order):
 # --- corners, ends and waves of the line ---
 
 
-@pytest.mark.study
+@pytest.mark.study(witness=["0.0004-1", "0.1-2"])
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-4, 4e-4, 6e-4, 1e-3, 1e-2, 0.1, 1.0])
 def test_uniform_stress_across_a_corner(size, order):

@@ -49,11 +49,6 @@ def at_corner(line, vertex):
     return np.flatnonzero(np.linalg.norm(line.position - vertex, axis=1) < 1e-12)
 
 
-def one_corner(turn, left=1.0, right=0.73):
-    slope = math.tan(turn / 2)
-    return [(-left, -left * slope), (0.0, 0.0), (right, -right * slope)]
-
-
 @pytest.mark.parametrize("order", ORDERS)
 def test_bounded_zone_has_two_points_at_corners(order):
     trace, line = polygonal(order)
@@ -70,44 +65,6 @@ def test_bounded_zone_has_two_points_at_corners(order):
     side = np.searchsorted([LINE[1][0], LINE[2][0]], middle)
     normals = np.repeat(DOWNWARD[side][:, None], order + 1, axis=1)
     np.testing.assert_allclose(line.direction[line.rows], normals, atol=1e-15)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_weights_at_corners_are_one_sided(order):
-    trace, line = polygonal(order)
-    assert line.weight.sum() == pytest.approx(LENGTHS.sum(), rel=1e-14)
-    for k, d in enumerate(DOWNWARD):
-        on_side = np.abs(line.direction - d).max(axis=1) < 1e-12
-        assert line.weight[on_side].sum() == pytest.approx(LENGTHS[k], rel=1e-14)
-    end = {1: 1 / 2, 2: 1 / 6, 3: 1 / 12, 4: 1 / 20}[order]  # Gauss-Lobatto weight on [0, 1]
-    lengths = trace.lengths(line.segments)
-    for k in (1, 2):
-        points = at_corner(line, LINE[k])
-        adjacent = [lengths[(line.rows == p).any(axis=1)] for p in points]
-        assert all(len(length) == 1 for length in adjacent)
-        np.testing.assert_allclose(line.weight[points], end * np.ravel(adjacent), rtol=1e-13)
-
-
-@pytest.mark.parametrize("bare", [False, True])
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(order, bare):
-    # Below the turn that makes a corner one row stands for two sides of different lengths: weight
-    # times direction is the force of a unit pressure on both, exactly.
-    turn = math.radians(20) if bare else 4e-4
-    vertices = np.array(one_corner(turn))
-    mesh = ng.Mesh(blocks(line=vertices.tolist()).GenerateMesh(maxh=0.4))
-    if bare:
-        mesh = ng.Mesh(mesh.ngmesh.Copy())
-        mesh.ngmesh.SetGeometry(None)
-    trace = boundary_trace(mesh, order)
-    line = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    assert (np.bincount(line.node) <= 1).all()
-    here = trace.segments("upper_contact")
-    lengths = trace.lengths(here)
-    assert lengths.max() > 1.05 * lengths.min()
-    along = vertices[-1] - vertices[0]
-    resultant = line.weight @ line.direction
-    np.testing.assert_allclose(resultant, [along[1], -along[0]], rtol=1e-14, atol=1e-15)
 
 
 def test_steep_sides_do_not_face_a_fixed_direction():

@@ -14,7 +14,6 @@ from ngcontact.linalg.multigrid import (
     SAFETY,
     Chebyshev,
     GaussSeidel,
-    Multigrid,
     StalledError,
     fastest,
     truncated_multigrid,
@@ -34,18 +33,6 @@ def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=Gau
     free = ~p.fixed
     free[p.unknown[: len(p.unknown) // 2]] = False
     return K, truncated_multigrid(matrix, steps_of(problem, 0), free, smoother), free
-
-
-def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
-    """The preconditioner as a matrix."""
-    right, solution = (multigrid.levels[0].matrix.CreateColVector() for _ in range(2))
-    columns = np.zeros((size, size))
-    for i in range(size):
-        right[:] = 0.0
-        right[i] = 1.0
-        multigrid.cycle(right, solution)
-        columns[i] = solution.FV().NumPy()
-    return columns
 
 
 @pytest.mark.parametrize(
@@ -187,16 +174,6 @@ def same(one: Iterate, other: Iterate) -> None:
     # Measured 1e-13 to 5e-12 at 1e5 unknowns.
     np.testing.assert_allclose(one.u, other.u, rtol=0, atol=1e-10 * np.abs(other.u).max())
     np.testing.assert_allclose(one.force, other.force, rtol=0, atol=1e-10 * other.force.max())
-
-
-@pytest.mark.parametrize("name", REFINED)
-def test_minimisers_are_those_of_a_factor(name: str):
-    scene = Scene(name, 1, 3)
-    start = np.arange(len(scene.program.g)) % 2 == 0  # no motion is free from there
-    result = minimise(scene.systems(), start)
-    assert result.factorizations == 0
-    assert result.back_solves > 10
-    same(result, scene.direct())
 
 
 @pytest.mark.parametrize("limits", [Limits(cycles=1), Limits(restarts=0)])

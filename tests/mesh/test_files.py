@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.reference.straight import relative_energy_error
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, find_contacts, solve
+from ngcontact import ContactWarning, Elastic, Problem, adapt, find_contacts, solve
 from ngcontact.geometries import blocks, disc_on_block, rings
 from ngcontact.mesh import cad_edges, curve, first_mesh, read
 from ngcontact.problem import MeshArrays
@@ -185,44 +185,6 @@ def test_second_order_keeps_the_rates_of_order_2(tmp_path):
     assert all(error < known for error, known in zip(errors, estimates, strict=True))
     right = pressure["outer"] * (1 - 1e-3) * math.pi / 2
     assert levels[-1].force.sum() == pytest.approx(right, rel=1e-3)
-
-
-def pin_in_plate(geometry):
-    """A pin that is pressed down in a hole of the ring of `rings`, wider by 1e-3."""
-    return Problem(
-        geometry,
-        {"inner|outer": Elastic(E=1.0, nu=0.3)},
-        displacement={"rim": (0, 0), "hole": (0, -5e-3)},
-        contact=[Contact("inner_contact", "outer_contact")],
-    )
-
-
-def pressed_disc(geometry):
-    return Problem(
-        geometry,
-        {"disc|block": Elastic(E=1.0, nu=0.3)},
-        sliding="axis",
-        displacement={"block_bottom": (None, 0), "disc_top": (None, -0.02)},
-        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-    )
-
-
-@pytest.mark.filterwarnings("ignore:sides of second order")
-@pytest.mark.parametrize(
-    ("posed", "geometry"),
-    [(pin_in_plate, rings(0.5, 1.0, 2.0, -1e-3)), (pressed_disc, disc_on_block())],
-)
-def test_contact_on_the_curves_of_a_file(tmp_path, posed, geometry):
-    """Energies and forces are those of the drawing, within the estimates."""
-    drawn_one = [*adapt(posed(geometry), tolerance=1e-2)][-1]
-    mesh = read(drawn(geometry, 0.15, 2).write(tmp_path / "file.msh", 4.1, 2))
-    levels = list(adapt(posed(mesh), order=2, max_dofs=12_000))
-    for level in levels:
-        allowed = level.error_estimate**2 + drawn_one.error_estimate**2
-        # Half of that but for the file's curve, 1e-3 of the clearance off.
-        assert abs(level.energy - drawn_one.energy) < allowed
-    one, other = (np.linalg.norm(s.contact_force()) for s in (drawn_one, levels[-1]))
-    assert other == pytest.approx(one, rel=2e-3)
 
 
 def test_first_order_files_say_that_curves_are_polygons(tmp_path):
