@@ -244,7 +244,8 @@ def check_overlaps(view: MeshArrays) -> None:
         return
     area = view.measures
     size = np.array([area[part].sum() for part in parts])
-    box = np.array([[view.corners[p].min((0, 1)), view.corners[p].max((0, 1))] for p in parts])
+    points = [view.vertices[view.pieces == k] for k in range(len(parts))]
+    box = np.array([[x.min(axis=0), x.max(axis=0)] for x in points])
     for small, large in itertools.combinations(np.argsort(size, kind="stable").tolist(), 2):
         width = np.minimum(box[small, 1], box[large, 1]) - np.maximum(box[small, 0], box[large, 0])
         if min(width) <= 0 or width.prod() <= OVERLAP_SHARE * size[small]:
