@@ -68,8 +68,8 @@ def test_two_threads_find_what_one_finds(name: str, order: int):
     with ng.TaskManager():
         two = solve(problem, mesh, order=order)
     assert two.work["factorizations"] == 0
-    # Polynomials in place of sweeps: measured 0.55 to 0.6 of the V-cycles.
-    assert two.work["back_solves"] < 0.7 * one.work["back_solves"]
+    # Sums in another order may end a system one V-cycle sooner or later.
+    assert abs(two.work["back_solves"] - one.work["back_solves"]) <= len(one.steps)
     same(two, one)
     np.testing.assert_allclose(two.indicators, one.indicators, rtol=1e-8)
 

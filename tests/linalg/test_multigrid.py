@@ -2,20 +2,15 @@
 
 import logging
 
-import ngsolve as ng
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
 from ngcontact.linalg.iterative import IterativeSystems, Limits
 from ngcontact.linalg.multigrid import (
-    DEGREE,
     LONG_ROWS,
-    SAFETY,
-    Chebyshev,
     GaussSeidel,
     StalledError,
-    fastest,
     truncated_multigrid,
 )
 from ngcontact.linalg.sparse import cholesky, congruent, handed_over
@@ -23,7 +18,7 @@ from ngcontact.qp import BorderedSystems, Iterate, minimise
 from tests.scenes import REFINED, discrete, steps_of
 
 
-def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=GaussSeidel):
+def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):
     """Matrix, multigrid and free unknowns, every second contact row active."""
     problem = discrete(REFINED[name], order, rounds, maxh)
     p = problem.program
@@ -32,27 +27,18 @@ def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=Gau
     )
     free = ~p.fixed
     free[p.unknown[: len(p.unknown) // 2]] = False
-    return K, truncated_multigrid(matrix, steps_of(problem, 0), free, smoother), free
+    return K, truncated_multigrid(matrix, steps_of(problem, 0), free), free
 
 
-@pytest.mark.parametrize(
-    ("smoother", "order", "most"),
-    # Measured 30, 40, 52 and 61 at most for ten digits with sweeps, 13, 21, 28 and 38
-    # with polynomials.
-    [
-        *((GaussSeidel, *counts) for counts in ((1, 38), (2, 50), (3, 64), (4, 75))),
-        *((Chebyshev, *counts) for counts in ((1, 16), (2, 26), (3, 35), (4, 47))),
-    ],
-)
+# Measured 30, 40, 52 and 61 at most for ten digits.
+@pytest.mark.parametrize(("order", "most"), [(1, 38), (2, 50), (3, 64), (4, 75)])
 @pytest.mark.parametrize("name", REFINED)
-@pytest.mark.study(
-    witness=["disc-GaussSeidel-1-38", "disc-GaussSeidel-2-50", "disc-Chebyshev-1-16"]
-)
-def test_cycles_do_not_grow_with_the_mesh(name: str, smoother, order: int, most: int):
+@pytest.mark.study(witness=["disc-1-38", "disc-2-50"])
+def test_cycles_do_not_grow_with_the_mesh(name: str, order: int, most: int):
     rng = np.random.default_rng(order)
     counts = []
     for rounds in (1, 2, 3):
-        K, multigrid, free = prepared(name, order, rounds, smoother=smoother)
+        K, multigrid, free = prepared(name, order, rounds)
         b = np.where(free, rng.normal(size=K.shape[0]), 0.0)
         x, count = multigrid.solve(b, 1e-10 * np.abs(b).max(), 100)
         # The iteration's own residual drifts from this one by round-off.
@@ -88,62 +74,6 @@ def test_what_does_not_converge_is_said():
         multigrid.solve(b, 1e-10, 3)
     with pytest.raises(StalledError, match="V-cycles left nan"):
         multigrid.solve(np.full(K.shape[0], np.nan), 1e-10, 3)
-
-
-def matrix_of(name: str, order: int) -> tuple[np.ndarray, ng.BaseMatrix, np.ndarray]:
-    K, _, free = prepared(name, order, 1, 1.0)
-    return K.toarray(), handed_over(K), free
-
-
-def smoothed(smoother, right: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-    """What a smoother makes of `start`, or of zero."""
-    b, x = (ng.BaseVector(right.size) for _ in range(2))
-    b.FV().NumPy()[:] = right
-    x.FV().NumPy()[:] = np.nan if start is None else start
-    (smoother.before if start is None else smoother.after)(b, x)
-    return x.FV().NumPy().copy()
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_several_threads_take_polynomials():
-    _, matrix, free = matrix_of("disc", 1)
-    assert isinstance(fastest(matrix, free), GaussSeidel)  # no manager has been entered
-    with ng.TaskManager():
-        assert isinstance(fastest(matrix, free), Chebyshev)
-    ng.SetNumThreads(1)
-    with ng.TaskManager():
-        assert isinstance(fastest(matrix, free), GaussSeidel)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.parametrize("name", REFINED)
-def test_the_largest_eigenvalue_is_found(name: str, order: int):
-    K, matrix, free = matrix_of(name, order)
-    diagonal = K.diagonal()  # 0 at unknowns inside of elements
-    root = np.divide(1.0, np.sqrt(diagonal), np.zeros(len(diagonal)), where=diagonal > 0)
-    exact = np.linalg.eigvalsh(K * np.outer(root, root))[-1]
-    found = Chebyshev(matrix, free).largest / SAFETY
-    assert 0.9 * exact <= found <= exact * (1 + 1e-12)  # by Lanczos from below
-
-
-@pytest.mark.parametrize("name", REFINED)
-def test_the_polynomial_is_that_of_the_fourth_kind(name: str):
-    """Of an eigenvector W(1 - 2 t) / (2 k + 1) is left; W(cos a) = sin((k + 1/2) a) / sin(a/2)."""
-    K, matrix, free = matrix_of(name, 2)
-    smoother = Chebyshev(matrix, free)
-    inside = K[np.ix_(free, free)]
-    root = 1 / np.sqrt(inside.diagonal())
-    values, vectors = np.linalg.eigh(inside * np.outer(root, root))
-    for i in (0, values.size // 3, values.size - 1):
-        vector = np.zeros(free.size)
-        vector[free] = root * vectors[:, i]
-        a = np.arccos(1 - 2 * values[i] / smoother.largest)
-        factor = np.sin((DEGREE + 0.5) * a) / np.sin(a / 2) / (2 * DEGREE + 1)
-        right = np.where(free, K @ vector, 1.0)  # the last is not read
-        for start in (None, np.zeros(free.size)):
-            error = vector - smoothed(smoother, right, start)
-            round_off = 1e-12 * np.abs(vector).max()
-            np.testing.assert_allclose(error, factor * vector, rtol=0, atol=round_off)
 
 
 class Scene:
