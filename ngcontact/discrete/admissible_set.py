@@ -233,6 +233,16 @@ class AdmissibleSet:
     rows: Rows  # those of all pairs in order
     basis: BasisTransformation  # unknowns in which rows and prescribed values are single unknowns
 
+    def around(self, values: Array) -> Array:
+        """Sums (m, r) of `values` (m, r) of the rows over those on their segments."""
+        parts = [values[:0]]
+        for line, part in zip(self.lines, by_line(self.lines, values), strict=True):
+            segment, place = np.nonzero(line.rows >= 0)
+            point, size = line.rows[segment, place], (len(line.rows), len(part))
+            on = from_triplets(np.ones(len(point)), segment, point, size)
+            parts.append(on.T @ (on @ part))
+        return np.concatenate(parts)
+
 
 def admissible_set(
     space: Space, conditions: Conditions, found: Sequence[ContactLine]

@@ -306,7 +306,7 @@ def discretise(
         )
     admissible = admissible_set(space, conditions, found)
     basis, rows = admissible.basis, admissible.rows
-    rigid, f = equilibrium(problem, space, conditions, rows, basis)  # Remark 3.7
+    rigid, f = equilibrium(problem, space, conditions, rows, basis, admissible.around)  # Remark 3.7
     space = replace(space, f=f)
     T = space.basis @ basis.T
     same_unknowns = previous is not None and same_basis(basis, previous.basis)

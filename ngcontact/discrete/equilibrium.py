@@ -7,7 +7,7 @@ supports and contact admit.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -36,6 +36,7 @@ QUADRATURE_ERRORS = 3.0
 WORK_NOISE = 1e-10  # work that is allowed besides, relative to the sum of its terms: round-off
 FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
 MIN_RESISTANCE = 1e-2  # change of gaps by a unit motion, below which contact hardly resists it
+SPREAD_SHARE = 1e-6  # of the force of a point that those beside it on its segments have at least
 WORK_ROUND_OFF = 1e-14  # work, relative to the most that the load could do, that is none
 
 
@@ -290,16 +291,23 @@ class Rigid:
 
 
 def equilibrium(
-    problem: Problem, space: Space, conditions: Conditions, rows: Rows, basis: BasisTransformation
+    problem: Problem,
+    space: Space,
+    conditions: Conditions,
+    rows: Rows,
+    basis: BasisTransformation,
+    around: Callable[[Array], Array],
 ) -> tuple[Rigid | None, Array]:
     """The rigid motions that supports leave free, and the load (d * N,) in equilibrium on them.
 
-    None, and the load as it is, if supports alone hold all bodies.
+    None, and the load as it is, if supports alone hold all bodies. `around` sums values of rows
+    over those on their segments.
 
     Raises
     ------
     NoEquilibriumError
-        The load does work on a rigid motion that supports and contact admit.
+        The load does work on a rigid motion that supports and contact admit, or needs contact
+        forces at single points.
     ValueError
         The elements do not contain the rotation of a free body.
     """
@@ -313,11 +321,17 @@ def equilibrium(
     if not unbalanced.is_within(WORK_NOISE * terms):
         _check_work(problem, free, left_sides, rows.equality, work - noise, WORK_NOISE * terms)
     left = unbalanced.work + noise
+    unresisted = vanishing_combinations(left_sides)
+    size = np.abs(unbalanced.forces)
+    if np.sum(size > SPREAD_SHARE * size.max(initial=0.0)) < len(work) - unresisted.shape[1]:
+        spread = left_sides + SPREAD_SHARE * around(left_sides)
+        found = _unbalanced(spread, rows.equality, work - left)
+        if not found.is_within(np.zeros_like(work)):
+            raise _concentrated(free, rows.node, left_sides @ found.motion, found.motion, size)
     if left.any():  # Remark 3.7: without it the energy has no minimiser
         f = f - free.means @ np.linalg.solve(free.gram, left)
-    placing, carries = _placing(left_sides, work - left, rows.g, rows.equality)
+    placing, carries = _placing(left_sides, unresisted, work - left, rows.g, rows.equality)
     motions = basis.coordinates(free.nodal, of_rows)
-    unresisted = vanishing_combinations(left_sides)
     means = np.zeros((motions.shape[0], 0))
     if unresisted.size:  # the mean of such a motion over the boundary of the bodies vanishes
         means = basis.T.T @ (space.basis.T @ (free.means @ unresisted))
@@ -325,7 +339,9 @@ def equilibrium(
     return Rigid(free, left_sides, work, motions, null_space, placing, carries), f
 
 
-def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array, Mask]:
+def _placing(
+    rows: Array, unresisted: Array, work: Array, g: Array, equality: Mask
+) -> tuple[Array, Mask]:
     """Amounts (r,) of motions by which the load presses rigid bodies, and rows (m,) that carry it.
 
     No movement without load, and where bodies must deform to fit at all.
@@ -334,7 +350,6 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
     scale, force = np.abs(g).max(initial=0.0), np.abs(work).max(initial=0.0)
     if scale == 0.0 or force == 0.0:
         return no_motion
-    unresisted = vanishing_combinations(rows)
     free = ~equality
     result = linprog(
         -work / force,
@@ -355,13 +370,13 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
 
 @dataclass(frozen=True, eq=False)
 class _Unbalanced:
-    """The `work` (r,) of a load that contact forces cannot balance, and the sum of these forces.
+    """The `work` (r,) of a load that contact `forces` (m,) cannot balance.
 
     Round-off of the forces gives work on bodies that carry no load, too.
     """
 
     work: Array
-    forces: float
+    forces: Array
 
     @property
     def motion(self) -> Array:
@@ -375,8 +390,8 @@ class _Unbalanced:
 
     def is_within(self, error: Array, beside: float = 0.0) -> bool:
         """Whether errors (r,) of the work, round-off and work `beside` may have made it."""
-        allowed = float(np.abs(self.motion) @ error) + FORCE_ROUND_OFF * self.forces
-        return self.done <= allowed + beside
+        round_off = FORCE_ROUND_OFF * np.abs(self.forces).sum()
+        return bool(self.done <= np.abs(self.motion) @ error + round_off + beside)
 
 
 def _unbalanced(rows: Array, equality: Mask, work: Array) -> _Unbalanced:
@@ -384,9 +399,33 @@ def _unbalanced(rows: Array, equality: Mask, work: Array) -> _Unbalanced:
     scale = np.abs(work).max(initial=0.0)
     G = np.vstack([rows, -rows[equality]]).T
     if scale == 0.0 or G.shape[1] == 0:
-        return _Unbalanced(work, 0.0)
-    force, _ = nnls(G, work / scale, maxiter=100 * G.shape[1])
-    return _Unbalanced(work - scale * (G @ force), scale * float(force.sum()))
+        return _Unbalanced(work, np.zeros(len(rows)))
+    force = scale * nnls(G, work / scale, maxiter=100 * G.shape[1])[0]
+    left, (m, pull) = work - G @ force, (len(rows), np.zeros(len(rows)))
+    pull[equality] = force[m:]
+    return _Unbalanced(left, force[:m] - pull)
+
+
+def _concentrated(
+    free: FreeMotions, node: Index, opening: Array, motion: Array, forces: Array
+) -> NoEquilibriumError:
+    """The error of a load through an end of contact, whose `forces` (m,) cannot be spread.
+
+    Their energy is infinite: at a point of the plane, in space along an edge. By a `motion` (r,)
+    that rows at nodes `node` (m,) do not resist contact opens, by `opening` (m,), elsewhere.
+    """
+    opening, trace, words = np.abs(opening), free.space.trace, free.motion(motion)
+    at = node[np.where(opening <= 2 * SPREAD_SHARE * opening.max(), forces, 0.0).argmax()]
+    segment, place = np.argwhere(trace.nodes == at)[0]
+    return NoEquilibriumError(
+        f"no equilibrium: the load does no work on a rigid {words}, which opens contact but for "
+        f"an end of its zone, at {_described(trace.positions(np.array([segment]))[0, place])}: a "
+        "force at a point, in space along an edge, has infinite energy, which no mesh resolves; "
+        "move the load towards the zone, or hold that body by `displacement` or `sliding`",
+        body=words.bodies[0],
+        motion=words,
+        work=0.0,
+    )
 
 
 def _check_work(

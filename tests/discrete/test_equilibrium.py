@@ -11,7 +11,15 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import Contact, ConvergenceError, Elastic, NoEquilibriumError, Problem, solve
+from ngcontact import (
+    Contact,
+    ConvergenceError,
+    Elastic,
+    NoEquilibriumError,
+    Problem,
+    adapt,
+    solve,
+)
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
@@ -79,6 +87,59 @@ def test_no_equilibrium(load, motion, work):
     assert failure.value.body == "upper"
     assert failure.value.work == pytest.approx(work, rel=1e-9)
     assert failure.value.motion.bodies == ("upper",)
+
+
+def seesaw(inside=0.0, secondary=0, rows="auto"):
+    """A plate with the load 4, whose middle is so far inside of the end of the block below."""
+    x = [2 - inside, -2 - inside]
+    outlines = {
+        "plate": [(x[0], 1), (x[1], 1), (x[1], 0), (x[0], 0)],
+        "block": [(0, 0), (-2, 0), (-2, -1), (0, -1)],
+    }
+    names = ["top", "side", "foot", "side"]
+    sides = "plate_foot", "block_top"
+    return Problem(
+        geometry=compound(
+            *(body(k, polygon(v, [f"{k}_{n}" for n in names])) for k, v in outlines.items())
+        ),
+        materials={".*": STEEL},
+        displacement={"block_foot": (0, 0)},
+        traction={"plate_top": 1.0},
+        contact=[Contact(sides[secondary], sides[1 - secondary], rows=rows)],
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize(("secondary", "rows"), [(0, "auto"), (1, "auto"), (0, "dual")])
+def test_a_load_through_the_end_of_contact(secondary, rows, order):
+    """It needs a force at a point; on V_h it has many solutions, which no two levels share."""
+    with pytest.raises(NoEquilibriumError, match=r"an end of its zone, at \(0, 0\)") as failure:
+        solve(seesaw(0.0, secondary, rows), maxh=0.4, order=order)
+    assert 'rotation of "plate" about' in str(failure.value.motion)
+    assert failure.value.work == 0.0
+
+
+def test_a_load_beside_the_end_of_contact():
+    """As near as 1e-5 of it: each tenth of the way takes the same energy, that of two wedges.
+
+    Under F at its tip the stress of a wedge is radial, -F (c cos t / (a + sin a cos a) + s sin t /
+    (a - sin a cos a)) / r, for the half angle a and a force (c, s) along and across its axis.
+    """
+    energies = [list(adapt(seesaw(x), tolerance=1e-2))[-1].energy for x in (1e-4, 1e-5)]
+    half_plane, quarter = 1 / math.pi, 1 / (math.pi / 2 + 1) + 1 / (math.pi / 2 - 1)
+    modulus = STEEL.E / (1 - STEEL.nu**2)
+    per_tenth = 4.0**2 / modulus * (half_plane + quarter / 2) * math.log(10)
+    # The energies of both have relative errors below 1e-4, of which their difference is a fifth.
+    assert energies[0] - energies[1] == pytest.approx(per_tenth, rel=1e-3)
+
+
+def test_forces_on_one_face_of_a_notch():
+    """A motion opens the other one, and the force is spread: the disc slides until it touches."""
+    problem = replace(resting(), force={"disc": (WEIGHT, -WEIGHT)})
+    solution = solve(problem, maxh=0.25, order=2)
+    disc = WEIGHT * mesh_area(solution, "disc")
+    forces = np.array([solution.contact_force(k) for k in range(2)])
+    assert np.abs(forces - disc * np.array([[0, 0], [-1, 1]])).max() <= 1e-10 * disc
 
 
 def test_the_paper_s_own_problem():

@@ -66,3 +66,14 @@ def test_eccentric_load():
     # int x (1 + x) over the top
     assert solution.force @ solution.points[:, 0] == pytest.approx(1 / 12, abs=1e-10)
     assert solution.force @ solution.points[:, 1] == pytest.approx(0.0, abs=1e-10)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_load_through_an_edge(order):
+    """Its forces would be on a line, whose energy is infinite; just beside it they are spread."""
+    load = ng.CF((0, 0, -(1 + 6 * ng.x)))  # the resultant 1 at x = 6 / 12, the edge of the cube
+    with pytest.raises(NoEquilibriumError, match=r"an end of its zone, at \(0.5, "):
+        solve(cube_on_block(traction={"upper_top": load}), order=order)
+    load = ng.CF((0, 0, -(1 + 5.99 * ng.x)))
+    solution = solve(cube_on_block(traction={"upper_top": load}), order=order)
+    assert solution.force @ solution.points[:, 0] == pytest.approx(5.99 / 12, abs=1e-10)
