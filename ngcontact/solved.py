@@ -13,10 +13,19 @@ import numpy as np
 from .arrays import Array, Index, Mask
 from .contact import ContactState, contact_states, curves_at_ends, signed_distance, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
-from .fem import FacetTrace, energy_norm, model_of, normal_stress_of, potential_energy, stress_of
+from .fem import (
+    FacetTrace,
+    contact_modulus,
+    energy_norm,
+    model_of,
+    normal_stress_of,
+    potential_energy,
+    stress_of,
+)
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 
+PLANE_MODELS = ("plane strain", "plane stress")
 STRESS_FREE = 1e-12  # norm of a stress, relative to the terms that cancel in it: round-off
 
 
@@ -230,6 +239,17 @@ def made_of(
         work=work | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
         **others,
     )
+
+
+def expected_pairs(solution: Solved) -> list[ContactState]:
+    """The pairs of a solution as a finer mesh should find them, see `ContactState.expected`."""
+    problem, trace, found = solution.problem, solution.discrete.space.trace, list[ContactState]()
+    if problem.model not in PLANE_MODELS:
+        return solution.pairs
+    for state in solution.pairs:
+        sides = trace.element[state.line.segments], trace.element[state.line.facing]
+        found.append(state.expected(contact_modulus(problem, solution.mesh, *sides)))
+    return found
 
 
 def full_stress(solution: Solved) -> ng.CoefficientFunction:

@@ -13,6 +13,7 @@ from ..estimator import Estimated
 from ..fem import ORDERS, check_element, jumping_moduli, unknowns
 from ..mesh import copied, curve, unresolved
 from ..problem import MeshArrays, bisect
+from ..solved import expected_pairs
 from .marking import doerfler, mark_alike
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact
@@ -144,13 +145,13 @@ def next_plan(
     if not indicators.any():
         indicators = solution.indicators
     order = refinement.next_order(last.order, solution.relative_error_estimate)
-    size = refinement.ending * solution.relative_error_estimate
+    size, pairs = refinement.ending * solution.relative_error_estimate, expected_pairs(solution)
     jumping, limit = jumping_moduli(problem, mesh), at_limit(mesh, mesh.GetCurveOrder())
     marked = doerfler(indicators, theta)
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)
     marked = mark_alike(marked, jumping, MeshArrays(mesh).diameters)
-    marked |= at_ends(solution.discrete.space.trace, solution.pairs, size) | narrow
+    marked |= at_ends(solution.discrete.space.trace, pairs, size) | narrow
     stuck, marked = bool((marked & limit).any()), marked & ~limit
     if not marked.any():
         return replace(last, ends=True)
@@ -169,7 +170,7 @@ def next_plan(
         corners=MeshArrays(mesh).corners,
         squares=(scale * indicators / error) ** 2,
         order=order,
-        singular=joined([last.corners, ends_of_contact(solution.pairs)]),
+        singular=joined([last.corners, ends_of_contact(pairs)]),
     )
     growth = 1.0 if jumping.any() else growth
     aim = Aim(now * growth, refinement.max_dofs, share, theta, size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -141,6 +141,7 @@ def ending_segments(line: ContactLine, ends: Transitions) -> Index:
 TURN_COSINE = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
 # Of the radius of a zone around an axis, over which its pressure is fitted there.
 AXIS_SHARE = 1 / 3
+LONG_SEGMENT = 0.2  # over half a zone, from which its end is told better by force than by gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +164,7 @@ class ContactState:
     gap: Array
     force: Array
     active: Mask
+    ends: Transitions | None = None  # where they are not those of the gap
 
     @property
     def pressure(self) -> Array:
@@ -178,7 +180,41 @@ class ContactState:
     @cached_property
     def transitions(self) -> Transitions:
         """Transitions from binding to non-binding contact."""
-        return transitions_on(self.line, self.gap, self.active)
+        return self.ends or transitions_on(self.line, self.gap, self.active)
+
+    def expected(self, modulus: float) -> ContactState:
+        """The state that a finer mesh should find: contact ends where its forces tell.
+
+        These are right long before points resolve a zone. Under a force F per length, with a gap of
+        curvature k between bodies of the `modulus` E*, it has Hertz's half-width a, the root of
+        4 F / (pi E* k). That is taken where it ends in the same segment as by the gap, and the
+        segment is long. A zone with one end on its line is half of one.
+        """
+        ends, active, x = self.transitions, self.active.copy(), self.line.position
+        inner, outer, position = ends.inner.copy(), ends.outer.copy(), ends.position.copy()
+        order = self.line.rows.shape[1] - 1
+        for k, (closed, opened) in enumerate(zip(ends.closed, ends.opened, strict=True)):
+            path, first = np.append(closed[::-1], opened[: max(order, 2)]), len(closed)
+            force = self.force[closed].sum()
+            if len(path) < 3 or force <= 0 or ends.beyond[k] == 0:  # at a corner, or a vertex
+                continue
+            middle = self.force[closed] @ x[closed] / force
+            if np.isin(ends.inner, closed).sum() == 1:
+                middle, force = x[closed[-1]], 2 * force
+            s = (x[path] - middle) @ (x[path[-1]] - middle)
+            s /= np.sqrt(s[-1])
+            powers = np.vander(s / s[-1], 3)
+            curvature = 2 * np.linalg.lstsq(powers, self.line.gap[path])[0][0] / s[-1] ** 2
+            a = np.sqrt(4 * force / (np.pi * modulus * curvature)) if curvature > 0 else np.inf
+            long = s[-1] - s[first - 1] > LONG_SEGMENT * a
+            if long and s[max(first - 1 - order, 0)] <= a < s[-1]:
+                active[path[s > 0]] = s[s > 0] <= a
+                active[path[np.abs(s).argmin()]] = True
+                last = max(int(np.count_nonzero(s <= a)), 1)
+                inner[k], outer[k] = path[last - 1 : last + 1]
+                position[k] = [np.interp(a, s, x[path, axis]) for axis in (0, 1)]
+        ends = replace(ends, inner=inner, outer=outer, position=position)
+        return replace(self, active=active, ends=ends)
 
 
 def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array:

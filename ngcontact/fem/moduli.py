@@ -102,7 +102,9 @@ def _moduli(C: Array) -> Array:
 
 
 def contact_modulus(problem: Problem, mesh: ng.Mesh, *sides: Index) -> float:
-    """E* of solids, a stress: 1 / E* is the sum of (1 - nu^2) / E, in the mean over each side.
+    """E*, a stress: 1 / E* is the sum of (1 - nu^2) / E, in the mean over each side.
+
+    In plane stress of 1 / E.
 
     The sides are elements (k,); one without any is rigid. Of laws that are not isotropic the
     modulus of shear and the bulk modulus of `Moduli` count.
@@ -113,6 +115,7 @@ def contact_modulus(problem: Problem, mesh: ng.Mesh, *sides: Index) -> float:
     for side in sides:
         if len(side):
             mu, kappa = moduli.shear[side].mean(), moduli.bulk[side].mean()
+            kappa -= mu / 3 if mesh.dim == 2 else 0.0  # that of space
             compliance += (3 * kappa + 4 * mu) / (4 * mu * (3 * kappa + mu))
     return 1 / compliance
 

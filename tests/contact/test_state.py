@@ -10,7 +10,12 @@ import pytest
 from drivers.reference import axisymmetric_cases as cases_about_an_axis
 from ngcontact import Contact, solve
 from ngcontact.contact.line import in_contact
-from ngcontact.contact.state import continued_to_axis, pressure_across_corners, transitions_on
+from ngcontact.contact.state import (
+    ContactState,
+    continued_to_axis,
+    pressure_across_corners,
+    transitions_on,
+)
 
 
 def line(x, order=1, y=None):
@@ -48,6 +53,33 @@ def test_two_zones_have_four_ends():
     found = transitions_on(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
     expected = [0.57, 1.43, 2.57, 3.43]
     assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_the_end_of_an_unresolved_zone_is_told_by_its_force(order, half):
+    """Hertz's half-width, but not of a flat gap, nor in another segment, nor in a short one."""
+    x = np.arange(0 if half else -6 * order, 6 * order + 1) / order
+    curved, flat = (line(x, order) for _ in range(2))
+    curved.gap, flat.gap = x**2 / 10, 0 * x
+
+    def expected(points, closed, a):
+        """Ends, as they are and as expected, and points in contact; of half-width `a` by force."""
+        active = np.abs(x) < closed
+        force = active * np.pi * a**2 / 20 / active.sum() / (2 if half else 1)
+        state = ContactState(points, np.where(active, 0.0, 0.1 + np.abs(x) ** 1.5), force, active)
+        found = state.expected(1.0)
+        ends = (one.transitions.position[:, 0] for one in (state, found))
+        return *ends, found.active
+
+    _, ends, active = expected(curved, 0.1 / order, 0.4)
+    assert np.abs(ends) == pytest.approx(0.4, rel=1e-12)  # the line is straight
+    assert len(ends) == (1 if half else 2)
+    assert np.array_equal(active, np.abs(x) <= 0.4)
+    for asked in ((flat, 0.1 / order, 0.4), (curved, 0.1 / order, 4.0), (curved, 5.1, 5.5)):
+        known, ends, active = expected(*asked)
+        assert np.array_equal(ends, known)
+        assert np.array_equal(active, np.abs(x) < asked[1])
 
 
 def test_a_closed_line_has_no_first_point():
