@@ -131,19 +131,6 @@ def test_driver_writes_rows_and_pictures(tmp_path):
     assert line in page
 
 
-@pytest.mark.study
-def test_effectivity_on_curves():
-    """By stresses: the same band as against exact solutions on straight lines."""
-    study = STUDIES["disc on rigid plane"]()
-    errors = energy_errors(study, reference=12_000)
-    for order in (1, 2):
-        levels = run_of("disc on rigid plane", study, "adaptive", order, errors, 9000)
-        effectivities = np.array([row.effectivity for _, row in levels])[1:]
-        assert len(effectivities) >= 3
-        assert ((effectivities >= 1) & (effectivities <= 6)).all()
-        assert effectivities.max() / effectivities.min() < 1.2  # measured 1.06 and 1.04
-
-
 def test_every_study_has_its_name():
     assert get_args(Name) == tuple(STUDIES)
 

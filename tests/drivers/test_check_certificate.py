@@ -5,7 +5,6 @@ import copy
 import pickle
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import ngsolve as ng
@@ -15,29 +14,16 @@ import pytest
 from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases, laws
 from ngcontact import Contact, Problem, solve
-from tests.scenes import unmatched_blocks
+from tests.estimator.bound.test_energies import SCENES as BOUNDED
+from tests.estimator.bound.test_equilibrium import opening
 
 DRIVER = Path(check_certificate.__file__)
-
-
-def opening(**changes):
-    return replace(cases.partly_opening_block(), **changes)
-
-
-def glued():
-    """Contact that may pull, under a load that lifts."""
-    pair = Contact("upper_contact", "lower_contact", bilateral=True)
-    return opening(contact=[pair], traction={"pressed": -1.0})
 
 
 def on_obstacle():
     """No support but guides: a rigid plane holds the lower block."""
     contact = [*opening().contact, Contact("bottom", gap=0.0)]
     return opening(displacement={}, contact=contact, traction={"pressed|top": 1.0})
-
-
-def unmatched():
-    return replace(cases.one_transition().problem, geometry=unmatched_blocks())
 
 
 def with_forces():
@@ -60,10 +46,10 @@ SCENES = {
     "guided": (lambda: cases.guided_transition().problem, [1, 2]),
     "corners": (lambda: cases.polygonal_patch().problem, [1, 3]),
     "lifting off": (opening, [1, 2, 3, 4]),
-    "bilateral": (glued, [1, 2, 3]),
+    "bilateral": (BOUNDED["bilateral"], [1, 2, 3]),
     "obstacle": (on_obstacle, [1, 2, 3]),
     "punch": (cases.flat_punch, [1, 2, 4]),
-    "dual rows": (unmatched, [1, 2, 3]),
+    "dual rows": (BOUNDED["dual rows"], [1, 2, 3]),
     "layers": (lambda: laws.stiff_and_soft(1e8).problem, [1, 2]),
     "graded": (lambda: laws.graded(1e3).problem, [2]),
     "bent fibres": (lambda: laws.bent_fibres(100.0, 0.3).problem, [2, 3]),

@@ -14,9 +14,9 @@ from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.geometries import rings
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import compound
 from tests.estimator.bound.test_exact import RESIDUAL, settled
-from tests.scenes import unmatched_blocks
+from tests.scenes import rectangle, unmatched_blocks
 
 LAW = Elastic(E=1.0, nu=0.3)
 # Of polynomials through values, and of their derivatives, relative to stresses; measured 2e-10.
@@ -172,22 +172,15 @@ def test_a_pin_that_may_turn(order, maxh):
     assert solution.error_bound < 2 * solution.error_estimate
 
 
-def on_a_wide_block(left, right):
-    """A block from x = `left` to `right`, pressed on one from -1 to 1."""
-    upper = [(left, 0), (right, 0), (right, 0.5), (left, 0.5)]
-    lower = [(-1, -0.7), (1, -0.7), (1, 0), (-1, 0)]
-    return compound(
-        body("upper", polygon(upper, ["foot", "side", "top", "side"])),
-        body("lower", polygon(lower, ["bottom", "wall", "seat", "wall"])),
-    )
-
-
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("right", [0.42, 0.02, 1e-3])
 def test_sides_beside_vertices(right, order):
     """An edge lies next to a vertex of the other body: triangles are thin, the stress is one."""
     problem = Problem(
-        geometry=on_a_wide_block(-0.37, right),
+        geometry=compound(
+            rectangle("upper", (-0.37, right), (0, 0.5), ("foot", "side", "top", "side")),
+            rectangle("lower", (-1, 1), (-0.7, 0), ("bottom", "wall", "seat", "wall")),
+        ),
         materials={"upper|lower": LAW},
         displacement={"bottom": (0, 0), "top": (0, -1e-3)},
         contact=[Contact("foot", "seat", rows="dual")],

@@ -68,19 +68,14 @@ def magnified(size, angle=0.0, law=None):
     )
 
 
-@pytest.mark.parametrize("size", [SMALL, LARGE])
-def test_lengths(size):
-    one, other = (solve(magnified(h), order=2) for h in (1.0, size))
+@pytest.mark.parametrize(
+    ("size", "angle", "order"), [(SMALL, 0, 2), (LARGE, 0, 2), (1, 0.3, 1), (1, 2.0, 3)]
+)
+def test_lengths_and_directions(size, angle, order):
+    one, other = (solve(magnified(h, a), order=order) for h, a in ((1.0, 0.0), (size, angle)))
     settled(other)
     assert other.relative_error_bound == pytest.approx(one.relative_error_bound, rel=1e-6)
     assert other.error_bound == pytest.approx(size * one.error_bound, rel=1e-6)
-
-
-@pytest.mark.parametrize("order", [1, 3])
-@pytest.mark.parametrize("angle", [0.3, 2.0])
-def test_directions(angle, order):
-    one, other = (solve(magnified(1.0, a), order=order) for a in (0.0, angle))
-    assert other.relative_error_bound == pytest.approx(one.relative_error_bound, rel=1e-6)
 
 
 def turned(C, angle):
