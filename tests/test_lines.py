@@ -24,8 +24,9 @@ from drivers.reference.straight import Exact, hertz, patch, relative_energy_erro
 from drivers.reference.westergaard import effective_modulus, hooke, moduli
 from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.geometries import blocks
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import compound
 from tests.given_meshes import structured
+from tests.scenes import rectangle
 
 RESIDUAL = 1e-10  # of the optimality conditions, dimensionless; round-off leaves 1e-16 to 1e-12
 TINY = 1e-12  # gaps, in units of the bodies' size 1
@@ -64,17 +65,6 @@ def touching(mesh, exact, where=OUTSIDE):
 # --- gaps next to zero, and contact without strict complementarity ---
 
 
-def stacked(gap, base):
-    """Two blocks 2 by 1 that part at y = `base`, with a distance between them; names of blocks."""
-    low = base + gap
-    upper = [(-1, low), (1, low), (1, base + 1), (-1, base + 1)]
-    lower = [(1, base), (-1, base), (-1, base - 1), (1, base - 1)]
-    return compound(
-        body("upper", polygon(upper, ["upper_contact", "upper_right", "top", "upper_left"])),
-        body("lower", polygon(lower, ["lower_contact", "lower_left", "bottom", "lower_right"])),
-    )
-
-
 @pytest.mark.parametrize("direction", [None, (0.0, -1.0)])
 @pytest.mark.parametrize("base", [0.0, 1000.0])
 def test_last_bits_of_drawn_gaps(base, direction):
@@ -83,7 +73,14 @@ def test_last_bits_of_drawn_gaps(base, direction):
     def pressed(gap):
         pair = Contact("upper_contact", "lower_contact", direction=direction)
         down = {"top": (0, -0.1), "bottom": (0, 0)}
-        problem = cases.touching_blocks(down, geometry=stacked(gap, base), contact=[pair])
+        upper = ("upper_contact", "side", "top", "side")
+        drawn = compound(
+            rectangle("upper", (-1, 1), (base + gap, base + 1), upper),
+            rectangle(
+                "lower", (-1, 1), (base - 1, base), ("bottom", "side", "lower_contact", "side")
+            ),
+        )
+        problem = cases.touching_blocks(down, geometry=drawn, contact=[pair])
         return solved(problem, maxh=0.25, order=2)
 
     bit, zero = float(np.spacing(base + 1.0)), pressed(0.0)

@@ -61,14 +61,6 @@ def test_smooth_errors_fall_with_the_power_of_the_size(order):
     assert (np.bincount(finer.origin) == 4).all()
 
 
-def test_the_error_at_a_singular_point_falls_with_its_own_power():
-    """One element of the four at a corner keeps 4^-3/2 of the square, the others 4^-3 each."""
-    singular = replace(unresolvable([np.zeros(2)]), powers=np.array([1.5]))
-    new = Forecast(TRIANGLE, np.ones(1), 2, singular).after(PARTS, np.zeros(4, dtype=int))
-    assert new.squares == pytest.approx([1 / 8, 1 / 64, 1 / 64, 1 / 64], rel=1e-14)
-    assert new.error == pytest.approx(np.sqrt(11 / 64), rel=1e-14)
-
-
 def test_plans_end_at_the_aim_and_never_exceed_the_most():
     mesh = first_mesh(PROBLEM, 0.25)
     marked = np.arange(mesh.ne) < 5

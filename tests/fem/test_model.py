@@ -1,7 +1,5 @@
 """Models: one object for each name, and what it says of stresses and rigid motions."""
 
-import math
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -52,29 +50,6 @@ def test_stress_out_of_the_plane(mesh, model, law, expected):
 def section():
     """Meridian section 0 < r < 1, 0 < z < 1."""
     return MakeStructured2DMesh(quads=False, nx=4, ny=4)
-
-
-def test_divergence_about_an_axis(section):
-    """Sigma = ((r^2, r z), (r z, z)), hoop r z: the divergence in cylindrical coordinates."""
-    stress = ng.CF((ng.x**2, ng.x * ng.y, ng.x * ng.y, ng.y), dims=(2, 2))
-    plane = ng.CF((2 * ng.x + ng.x, ng.y + 1))
-    found = MODELS["axisymmetric"].divergence(plane, stress, lambda: ng.x * ng.y)
-    expected = (3 * 0.4 + (0.16 - 0.4 * 0.7) / 0.4, 0.7 + 1 + 0.7)
-    assert found(section(0.4, 0.7)) == pytest.approx(expected)
-
-
-def test_measures_are_those_of_the_body_of_revolution(section):
-    """The volume and the lateral surface of a cylinder; resultants are axial."""
-    model = MODELS["axisymmetric"]
-    assert ng.Integrate(model.weighted(ng.CF(1.0)), section) == pytest.approx(math.pi)
-    right = section.Boundaries("right")
-    lateral = ng.Integrate(model.weighted(ng.CF(1.0)), section, definedon=right)
-    assert lateral == pytest.approx(2 * math.pi)
-    points = np.array([[0.0, 0.3], [1e-12, 0.0], [0.5, 0.2], [1.0, 1.0]])
-    assert model.measure(points) == pytest.approx(2 * math.pi * points[:, 0])
-    assert model.on_axis(points).tolist() == [True, True, False, False]
-    assert model.on_axis(1e9 * points).tolist() == [True, True, False, False]
-    assert model.resultant(np.array([3.0, 4.0])).tolist() == [0.0, 4.0]
 
 
 def test_strains_about_an_axis(section):

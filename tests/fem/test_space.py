@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference import cases
-from ngcontact import Elastic, Hooke, Problem, solve
+from ngcontact import Elastic, Problem, solve
 from ngcontact.fem import boundary_trace
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import disc, graphs, rings
@@ -168,25 +168,6 @@ def test_bar_in_tension(model, along, across, order):
     np.testing.assert_allclose(stress, [1, 0, 0, 0], atol=1e-13)
     assert solution.energy == pytest.approx(-along / 2, rel=1e-13)
     assert len(solution.force) == 0
-
-
-ANISOTROPIC = np.array([[5.0, 1.2, 0.4], [1.2, 2.0, -0.3], [0.4, -0.3, 0.9]])
-
-
-@pytest.mark.parametrize("model", ["plane strain", "plane stress"])
-def test_anisotropic_bar(model):
-    """Uniform tension along x of a law that couples it with shear."""
-    strain = np.linalg.solve(ANISOTROPIC, [1.0, 0.0, 0.0])
-    assert abs(strain[2]) > 0.05
-    exact = ng.CF((strain[0] * ng.x + strain[2] * ng.y, strain[1] * ng.y))
-    solution = square(
-        materials={"dom": Hooke(ANISOTROPIC)},
-        displacement={"bottom": exact},
-        traction={"right": (1, 0), "left": (-1, 0)},
-        model=model,
-    )
-    assert error(solution, exact) < 1e-14
-    np.testing.assert_allclose(solution.stress(solution.mesh(0.6, 0.7)), [1, 0, 0, 0], atol=1e-13)
 
 
 def test_only_elements_with_curved_sides_are_curved():

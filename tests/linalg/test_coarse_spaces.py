@@ -11,10 +11,8 @@ from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg import sparse
 from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
 from ngcontact.linalg.sparse import (
-    cholesky,
     cholesky_of_closed_rows,
     congruent,
-    lower_half,
     shared,
 )
 
@@ -194,13 +192,3 @@ def test_factors_without_the_couplings_of_open_rows(monkeypatch):
         reference = np.linalg.solve(K.toarray()[np.ix_(free, free)], right[free])
         # Round-off times the condition of T'AT, below 1e4.
         np.testing.assert_allclose(solution[free], reference, rtol=0, atol=1e-11)
-
-
-def test_factorisation_of_principal_parts():
-    rng = np.random.default_rng(2)
-    free = rng.random(SIZE) < 0.7
-    K = definite(rng)
-    right = rng.normal(size=SIZE)
-    solution = cholesky(lower_half(K))(free)(right)
-    assert (solution[~free] == 0).all()
-    np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())
