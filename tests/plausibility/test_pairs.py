@@ -16,6 +16,8 @@ from ngcontact.geometries.region import compound
 from ngcontact.plausibility import refinement_warning
 from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error
 from tests.scenes import pressed_ball, pressed_cube
+from tests.solids.test_patch import blocks as solid_blocks
+from tests.solids.test_patch import pressed
 
 SOFT = Elastic(E=1.0, nu=0.3)
 DOWN = (0, -1)
@@ -245,6 +247,33 @@ def test_solids_are_told_of_zones_of_few_points():
     """One point in contact at order 1, the pressures of which are far off."""
     assert only(lambda: solve(pressed_ball(0.005), maxh=0.7, order=1), SMALL_ZONE)
     assert quiet(lambda: solve(pressed_ball(0.2), maxh=0.4))  # five
+
+
+@pytest.mark.parametrize(
+    ("counts", "gap", "fine", "words"),
+    [
+        ((8, 8), 0.5 * (ng.x - 0.25) ** 2, (8, 8), "9 nodes in one row"),
+        ((4, 3), 0.1 * (ng.x - 0.3) ** 2 + 0.1 * ng.y**2 - 0.01, (8, 6), "apart, by 0.00198"),
+    ],
+)
+def test_solids_are_told_of_facets_that_are_wider_than_the_zone(counts, gap, fine, words):
+    """Below a roller and, by means over facets, below a ball; without it forces are right."""
+
+    def force(counts, order):
+        problem = pressed(solid_blocks(*counts))
+        contact = [replace(problem.contact[0], gap=gap)]
+        given = {"lower_bottom": (0, 0, 0), "upper_top": (0, 0, -0.01)}
+        problem = replace(problem, sliding=None, traction={}, displacement=given, contact=contact)
+        found = []
+        messages = told(lambda: found.append(solve(problem, order=order)))
+        return found[0].contact_force()[2], messages
+
+    coarse, [message] = force(counts, 1)
+    assert words in message
+    two, three = (force(fine, order) for order in (2, 3))
+    assert two[1] == three[1] == []
+    assert coarse > 1.25 * three[0]  # measured 1.31 and 1.63
+    assert two[0] == pytest.approx(three[0], rel=0.05)  # measured 1.9e-2 and 2.9e-2
 
 
 @pytest.mark.parametrize("solids", [False, True])
