@@ -205,19 +205,29 @@ def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
     ends; in a plane all axes, and they do not reach beyond the samples `inside`, and nothing is
     lost beside values that are kept, as windows do not fit into convex corners.
     """
-    least, again = values, window if inside is None else window + WINDOW_SAMPLES
-    axes = [-1] if inside is None else range(values.ndim)
-    if inside is not None:
-        least = np.where(inside, least, np.inf)
-    for axis in axes:
-        least = minimum_filter1d(least, window, axis)
     if inside is None:
-        least[..., : window // 2] = least[..., -(window // 2) :] = -np.inf
-    else:
-        least = np.where(inside, least, -np.inf)
-    for axis in axes:
-        least = maximum_filter1d(least, again, axis)
+        ends = np.full((len(values), window - 1), -np.inf)
+        least = np.hstack([ends, _extremes(np.minimum, values, window), ends])
+        return np.asarray(values - _extremes(np.maximum, least, window))
+    least = np.where(inside, values, np.inf)
+    for axis in range(values.ndim):
+        least = minimum_filter1d(least, window, axis)
+    least = np.where(inside, least, -np.inf)
+    for axis in range(values.ndim):
+        least = maximum_filter1d(least, window + WINDOW_SAMPLES, axis)
     return np.asarray(values - least)
+
+
+def _extremes(extreme: np.ufunc, values: Array, window: int) -> Array:
+    """Extremes (c, n - window + 1) of `values` (c, n) in all windows, of 2^k - 1 samples each.
+
+    By those in windows of half the size: SciPy's filters take six times as long.
+    """
+    found, half = values, 1
+    while half < window:
+        sides = extreme(found[:, : -half - 1], found[:, half + 1 :])
+        found, half = extreme(sides, values[:, half:-half]), 2 * half + 1
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +294,8 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
     for line in lines:
         components = np.hstack([line.sampled, -line.sampled]).T
         around = len(line.t) // 2 if line.closed else 0
-        components = np.pad(components, ((0, 0), (around, around)), mode="wrap")
+        ends = components[:, len(line.t) - around :], components[:, :around]
+        components = np.hstack([ends[0], components, ends[1]])
         for departure in _departures(components, limit)[:, around : around + len(line.t)]:
             changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
             runs = np.flatnonzero(changes).reshape(-1, 2).tolist()
