@@ -24,7 +24,7 @@ from ..constraints import BasisTransformation, Conditions, Rows
 from ..errors import NoEquilibriumError
 from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
 from ..linalg import shared
-from ..problem import Problem, numbers
+from ..problem import Problem, numbers, region_mask
 from ..qp import NULL_SPACE_TOLERANCE, NullSpace, pinned_null_space, vanishing_combinations
 from ..quadrature import Load, SampledElements, loads_of
 
@@ -470,7 +470,7 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
     region = {ng.VOL: arrays.bodies, ng.BND: arrays.boundaries}
     work, error = np.zeros((2, free.combinations.shape[1]))
     for load, (b, amounts) in itertools.product(loads, enumerate(free.of_bodies)):
-        kind, loaded = load.region.VB(), np.array(load.region.Mask())
+        kind, loaded = load.region.VB(), region_mask(load.region)
         here = np.flatnonzero((body[kind] == b) & loaded[region[kind]])
         moving = np.flatnonzero(amounts.any(axis=0))  # each motion is of one body
         if here.size and moving.size:

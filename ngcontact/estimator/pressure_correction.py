@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from ..arrays import Array, from_triplets
 from ..fem import moduli_of
 from ..linalg import cholesky, lower_half, shared
-from ..problem import MeshArrays
+from ..problem import MeshArrays, region_mask
 from ..quadrature import local_functions
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
@@ -51,7 +51,7 @@ def correcting_pressure(
     # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a factorisation
     # without pivots.
     size = forms.space.ndof
-    inside = np.array(forms.region.Mask())[MeshArrays(solution.mesh).bodies]
+    inside = region_mask(forms.region)[MeshArrays(solution.mesh).bodies]
     free = np.append(np.repeat(inside, forms.functions), K.diagonal() > 0)
     saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
     right = np.append(b, np.zeros(K.shape[0]))

@@ -87,10 +87,11 @@ def scaled(solved: Solved) -> ScaledSolution:
     any_varies = bool(problem.varying)
     exact = mesh.GetCurveOrder() == 1 and not any_varies and boundary.model.polynomial
     degree = boundary.order - 1 if exact else boundary.order
-    projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=components(stress).dim))
+    of_stress = components(stress)
+    projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=of_stress.dim))
     # The points of NGSolve's rule of order 2 lie on edges, along which moduli may jump.
     bonus = 1 if boundary.order == 1 and any_varies else 0
-    projected.Set(components(stress).Compile(), bonus_intorder=bonus)
+    projected.Set(of_stress, bonus_intorder=bonus)
     coefficients = projected.vec.FV().NumPy()
     rough = rough_moduli(problem, mesh)
     if rough.any():
@@ -211,11 +212,12 @@ def _displacement(
     boundary, order = solution.boundary, 2 * solution.order + DATA_BONUS
     points, weights = gauss(order)
     u, mesh, count = solution.displacement, solution.mesh, len(segments)
-    missed = ng.CF(tuple(value - u[axis] for axis, value in data.items()))
+    missed = [value - u[axis] for axis, value in data.items()]
 
     def miss(number: Index, s: Array) -> Array:
         """Values (k, m, c) at `s` (k, m) of segments of those numbers (k,), without a unit."""
-        w = boundary.evaluate(missed, np.repeat(segments[number], s.shape[1]), s.ravel())
+        at = np.repeat(segments[number], s.shape[1]), s.ravel()
+        w = np.hstack([boundary.evaluate(component, *at) for component in missed])
         return np.asarray(w.reshape(*s.shape, len(data)) / solution.strain)
 
     number, start, length = np.arange(count), np.zeros(count), np.ones(count)

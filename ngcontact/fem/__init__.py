@@ -15,6 +15,7 @@ from .facets import FacetTrace as FacetTrace
 from .facets import boundary_trace as boundary_trace
 from .model import MODELS as MODELS
 from .model import Model as Model
+from .model import summing as summing
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import Moduli as Moduli
 from .moduli import contact_modulus as contact_modulus

@@ -398,7 +398,7 @@ class BoundaryTrace:
         """
         sigma = self.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s)
         normal = self.normal(segment, s)
-        return np.einsum("kij,kj->ki", sigma.reshape(-1, *stress.dims), normal)
+        return (sigma.reshape(*normal.shape, normal.shape[1]) @ normal[:, :, None])[..., 0]
 
     def _corner(self, first: Index, second: Index, turn: Array) -> Mask:
         """Whether pairs of segments (k,) at a node are corners; their normals differ by `turn`."""
@@ -439,13 +439,15 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
         interior = np.where((ends[:, 0] < ends[:, 1])[:, None], interior, interior[:, ::-1])
         nodes = np.column_stack([ends[:, 0], interior, ends[:, 1]])
 
-    degree = max(1, mesh.GetCurveOrder())
-    rule = ng.IntegrationRule([(1 - s, 0, 0) for s in gauss_lobatto(degree)], [1] * (degree + 1))
-    curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))
-    curve = curve[:, :2].reshape(-1, degree + 1, 2)
+    xy, degree = view.vertices, max(1, mesh.GetCurveOrder())
+    curve = xy[ends]
+    if degree > 1:
+        s = gauss_lobatto(degree)
+        rule = ng.IntegrationRule([(1 - x, 0, 0) for x in s], [1] * len(s))
+        curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))[:, :2]
+        curve = curve.reshape(-1, degree + 1, 2)
 
     element, inner, edges = view.facet_elements, view.inner_facets, cad_edges(mesh)
-    xy = view.vertices
     opposite = xy[view.elements[element]].mean(axis=1) - xy[ends[:, 0]]
     right = rightward(xy[ends[:, 1]] - xy[ends[:, 0]])
     axis = model.on_axis(curve.reshape(-1, 2)).reshape(-1, degree + 1)

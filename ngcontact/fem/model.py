@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import TypeAlias
 
 import ngsolve as ng
@@ -22,6 +23,18 @@ Strains: TypeAlias = Mapping[str, tuple[Elastic | Hooke, CF]]
 MERIDIAN = (0, 1, 3)  # components of rr, zz, hoop, rz without the hoop
 
 
+@lru_cache
+def summing(n: int, *rows: tuple[int, ...]) -> CF:
+    """Matrix (r, n) whose products are sums of some entries of a vector (n,), `rows` of numbers.
+
+    A vector that NGSolve puts together from a tuple costs 30 microseconds, such a product one.
+    """
+    matrix = np.zeros((len(rows), n))
+    for row, at in zip(matrix, rows, strict=True):
+        row[list(at)] = 1.0
+    return ng.CF(tuple(matrix.ravel().tolist()), dims=matrix.shape)
+
+
 class Model:
     """Plane strain of unit thickness, components xx, yy, xy; other models override it."""
 
@@ -34,10 +47,15 @@ class Model:
     components: tuple[int, ...] = (0, 1, 3)  # of an initial strain, those of Voigt strains
     bulges = True  # whether strains normal to the plane act in it
 
-    def strain(self, u: CF) -> CF:
-        """Voigt strain (q,) of a displacement or trial function, e_ij in HH81 (2.6)."""
-        grad = ng.Grad(u)
-        return ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))  # (2.6)
+    def strain(self, u: CF | list[CF]) -> CF:
+        """Voigt strain (q,) of a displacement or trial function, e_ij in HH81 (2.6).
+
+        In the plane also of the two components of one, each a function of its own.
+        """
+        if isinstance(u, list):
+            x, y = map(ng.grad, u)
+            return summing(2, (0,), (), (1,)) * x + summing(2, (), (1,), (0,)) * y
+        return summing(4, (0,), (3,), (1, 2)) * ng.Grad(u).Reshape((4,))  # (2.6)
 
     def initial_strain(self, law: Elastic | Hooke, e: CF) -> CF:
         """Voigt strain (q,) that leaves a body without stress in the plane.
@@ -54,7 +72,7 @@ class Model:
         """Voigt stress (q,) of a strain `e` (q,) by the law `C` (q, q), tau_ij in HH81 (2.6)."""
         return C * e  # (2.6)
 
-    def work(self, C: CF, u: CF, v: CF) -> list[CF]:
+    def work(self, C: CF, u: CF | list[CF], v: CF | list[CF]) -> list[CF]:
         """Densities over the plane mesh whose integrals add up to A(u, v) of HH81 (3.1)."""
         return [ng.InnerProduct(self.stress(C, self.strain(u)), self.strain(v))]  # (3.1)
 
@@ -89,8 +107,7 @@ class Model:
 
     def in_plane(self, voigt: CF) -> CF:
         """Stress (2, 2) in the plane by its q Voigt components."""
-        xx, yy, xy = voigt
-        return ng.CF((xx, xy, xy, yy), dims=(2, 2))
+        return (summing(3, (0,), (2,), (2,), (1,)) * voigt).Reshape((2, 2))
 
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         """Stress normal to the plane, a scalar, by the q Voigt components of the stress.
@@ -172,8 +189,7 @@ class _Axisymmetric(Model):
         return np.array([0.0, force[1]])  # radial forces cancel around the axis
 
     def in_plane(self, voigt: CF) -> CF:
-        rr, zz, _, rz = voigt
-        return ng.CF((rr, rz, rz, zz), dims=(2, 2))
+        return (summing(4, (0,), (3,), (3,), (1,)) * voigt).Reshape((2, 2))
 
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         return voigt[2]
@@ -194,17 +210,16 @@ class _Solid(Model):
     bulges = False
 
     def strain(self, u: CF) -> CF:
-        g = ng.Grad(u)
-        shear = (g[1, 2] + g[2, 1], g[0, 2] + g[2, 0], g[0, 1] + g[1, 0])
-        return ng.CF((g[0, 0], g[1, 1], g[2, 2], *shear))  # (2.6)
+        rows = (0,), (4,), (8,), (5, 7), (2, 6), (1, 3)
+        return summing(9, *rows) * ng.Grad(u).Reshape((9,))  # (2.6)
 
     def volume(self, u: CF) -> CF:
         return ng.Trace(ng.Grad(u))
 
     def in_plane(self, voigt: CF) -> CF:
         """Stress (3, 3) by its Voigt components."""
-        xx, yy, zz, yz, xz, xy = voigt
-        return ng.CF((xx, xy, xz, xy, yy, yz, xz, yz, zz), dims=(3, 3))
+        rows = (0,), (5,), (4,), (5,), (1,), (3,), (4,), (3,), (2,)
+        return (summing(6, *rows) * voigt).Reshape((3, 3))
 
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         """Refused: all of the stress of a solid is in its tensor."""

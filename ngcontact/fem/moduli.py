@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
-from ..problem import Elastic, Hooke, MeshArrays, Problem, numbers, varies
+from ..problem import Elastic, Hooke, MeshArrays, Problem, body_mask, numbers, varies
 from ..quadrature import SampledElements, features_of, lattice
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
@@ -74,7 +74,7 @@ def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Mod
     result = np.zeros((4, mesh.ne))
     region = MeshArrays(mesh).bodies
     for pattern, law in problem.materials.items():
-        at = np.array(mesh.Materials(pattern).Mask())[region]
+        at = body_mask(mesh, pattern)[region]
         at = at if asked is None else at & asked
         if not at.any():
             continue

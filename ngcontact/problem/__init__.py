@@ -21,5 +21,6 @@ from .strain import strain_components as strain_components
 from .values import body_mask as body_mask
 from .values import boundary_mask as boundary_mask
 from .values import numbers as numbers
+from .values import region_mask as region_mask
 from .values import scalar_data as scalar_data
 from .values import table as table

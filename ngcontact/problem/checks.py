@@ -296,6 +296,8 @@ def check_values(
     """
     of_bodies = rule is ELEMENT_RULES or rule is SIDE_RULES
     vb, region = (ng.VOL, view.bodies) if of_bodies else (ng.BND, view.boundaries)
+    if not masks:
+        return
     everywhere = view.mesh.MapToAllElements(rule[view.dim], vb)
     for (label, mask), value in zip(masks.items(), data, strict=True):
         points = np.asarray(everywhere[mask[region][everywhere["nr"]]])

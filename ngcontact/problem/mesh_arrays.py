@@ -159,9 +159,11 @@ class MeshArrays:
     @property
     def shared_facets(self) -> Mask:
         """Facets (k,) between two bodies that are glued."""
-        names = np.array(self.mesh.GetMaterials())[self.bodies]
-        one, other = self._at_facets
-        return np.asarray(names[one] != names[other])
+        names, (one, other) = np.array(self.mesh.GetMaterials()), self._at_facets
+        shared = one != other
+        sides = names[self.bodies[one[shared]]], names[self.bodies[other[shared]]]
+        shared[shared] = sides[0] != sides[1]
+        return shared
 
     def keys(self, vertices: Index) -> Index:
         """Numbers (k, ...) of sets of `vertices` (k, ..., d), whatever the order of these is."""
@@ -169,7 +171,8 @@ class MeshArrays:
 
     def without_simplices(self) -> int:
         """Number of elements that are no simplices."""
-        return int(np.count_nonzero(~np.isin(self._elements["type"], SIMPLICES[self.dim])))
+        kind, (one, other) = self._elements["type"], SIMPLICES[self.dim]
+        return int(np.count_nonzero((kind != one) & (kind != other)))
 
     @property
     def _elements(self) -> np.ndarray:

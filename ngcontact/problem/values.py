@@ -35,9 +35,15 @@ def body_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
 
 def _mask(select: Callable[[str], ng.Region], pattern: str) -> np.ndarray:
     try:
-        return np.fromiter(select(pattern).Mask(), dtype=bool)
+        return region_mask(select(pattern))
     except RuntimeError as error:
         raise ValueError(f'"{pattern}" is no name and no regular expression: {error}') from error
+
+
+def region_mask(region: ng.Region) -> np.ndarray:
+    """Return which of r region numbers are in a region, bool (r,)."""
+    mask = region.Mask()  # iterated over, it would end by an exception of C++: ten times the price
+    return np.array([*map(mask.__getitem__, range(len(mask)))], dtype=bool)
 
 
 def scalar_data(value: Any, what: str) -> float | ng.CoefficientFunction:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, root_of_squares
-from ..problem import POSITION, MeshArrays
+from ..problem import POSITION, MeshArrays, region_mask
 
 # Halvings of the sides: points beside corners of smaller parts are these.
 MAX_HALVINGS = {1: 38, 2: 10}
@@ -326,7 +326,7 @@ class SampledElements:
 
     def inside(self, region: ng.Region) -> Index:
         """Numbers (k,) of those in a region of the same dimension."""
-        return np.flatnonzero(np.array(region.Mask())[self._region])
+        return np.flatnonzero(region_mask(region)[self._region])
 
     @property
     def _region(self) -> Index:
