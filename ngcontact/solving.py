@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from typing import NoReturn
 
@@ -39,6 +39,7 @@ from .fem import boundary_trace, check_element, model_of, unknowns
 from .mesh import check_curves, curve, first_mesh, same_geometry
 from .plausibility import (
     EXACT_ESTIMATE,
+    Contradiction,
     at_round_off,
     contradictions,
     estimates_rise,
@@ -125,7 +126,7 @@ def solve(
     sample_data(problem, mesh)
     coarse: list[Solution] = []
     if start is None:
-        warn_of_implausible(problem, mesh, order)
+        warn_of_implausible(problem, mesh, order, contradictions(problem, mesh))
         coarse = _coarse_run(problem, mesh, order, element)
     if coarse:  # with roles that can be solved
         problem, start = coarse[-1].problem, coarse[-1]
@@ -151,7 +152,8 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     most = max(COARSE_DOFS, round(COARSE_SHARE * size))
     refinement = Refinement(COARSE_ORDER, "isoparametric", 0.5, None, most)
     try:
-        return list(levels(problem, _first_level(problem, maxh, refinement, None), refinement))
+        coarse = _first_level(problem, maxh, refinement, None)
+        return list(levels(problem, coarse, refinement, contradictions(problem, coarse)))
     except (ContactError, ValueError) as error:  # only the first guess depends on it
         log.debug("no coarse run: %s", error)
         return []
@@ -331,15 +333,16 @@ def adapt(
     check_bool("progress", progress)
     mesh = _first_level(problem, maxh, refinement, start)
     sample_data(problem, mesh)
-    if guaranteed and (found := contradictions(problem, mesh)):
+    found = contradictions(problem, mesh)
+    if guaranteed and found:
         x, y = found[0].place
         raise ValueError(  # no refinement makes a bound there
             f"no guaranteed bound is known for supports that contradict each other: "
             f"{found[0].message} at ({x:.6g}, {y:.6g}), and no displacement of finite energy takes "
             "both values; make them equal there, or leave guaranteed out"
         )
-    warn_of_implausible(problem, mesh, refinement.order)
-    solutions = with_warnings(levels(problem, mesh, refinement, start))
+    warn_of_implausible(problem, mesh, refinement.order, found)
+    solutions = with_warnings(levels(problem, mesh, refinement, found, start))
     return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
 
 
@@ -414,12 +417,16 @@ def _check_continuation(problem: Problem, start: Solution, order: int, element: 
 
 
 def _first_plan(
-    problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None
+    problem: Problem,
+    mesh: ng.Mesh,
+    refinement: Refinement,
+    contradictory: Sequence[Contradiction],
+    start: Solution | None,
 ) -> Plan:
     """The first level, of which nothing is forecast but by `start`."""
     found, tree = unresolvable([]), RefinementTree(mesh, np.arange(mesh.ne))
     if problem.dim == 2:
-        found = unresolvable([one.place for one in contradictions(problem, mesh)])
+        found = unresolvable([one.place for one in contradictory])
         found = joined([corners(problem, boundary_trace(mesh, 1)), found])
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)
     if start is None or _is_exact(start):
@@ -443,17 +450,22 @@ def _bound_ratio(solution: Solution) -> float:
 
 
 def levels(
-    problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None = None
+    problem: Problem,
+    mesh: ng.Mesh,
+    refinement: Refinement,
+    contradictory: Sequence[Contradiction],
+    start: Solution | None = None,
 ) -> Generator[Solution]:
     """Levels from a first mesh on; names and values have been checked.
 
     The mesh is curved as the element asks, and the first of the sequence of `start`, a solution
-    for another load.
+    for another load; `contradictory` are the supports that contradict each other there.
     """
     goal, guaranteed = refinement.tolerance or 0.0, refinement.guaranteed
     element, solution = refinement.element, None
     # Bound over estimate, by the last bound that was made.
-    ratio, warned, plan = BOUND_RATIO, False, _first_plan(problem, mesh, refinement, start)
+    ratio, warned = BOUND_RATIO, False
+    plan = _first_plan(problem, mesh, refinement, contradictory, start)
     while unknowns(plan.mesh, plan.order, element) <= refinement.max_dofs:
         earlier: tuple[Array, ...] = ()
         if solution is not None:  # its factorisation is of no use to the next one

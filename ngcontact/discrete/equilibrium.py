@@ -181,18 +181,20 @@ def free_motions(
     if not any(x.shape[1] for x in free):
         return None
     combinations = block_diag(*(np.eye(len(motions))[:, rigid] @ x for x in free))
-    own, of_unknown = _node_values(space, bodies), body_of_unknown(space, bodies)
-    of_node = np.tile(of_unknown[: len(own) // trace.model.dim], trace.model.dim)
+    of_unknown, n = body_of_unknown(space, bodies), space.basis.shape[1] // trace.model.dim
+    own = _node_values(space, bodies, of_unknown[:n])
+    of_node = np.tile(of_unknown[:n], trace.model.dim)
     own_values = space.basis @ own
     nodal = _by_body(own, of_node, combinations)
     values = _by_body(own_values, of_unknown, combinations)
-    forces = _by_body(space.A @ own_values, of_unknown, combinations)
-    terms = _largest(values * space.diagonal[:, None])
-    if (_largest(forces) > STRAIN_FORCE * terms).any():
-        raise ValueError(
-            "curved superparametric elements do not contain the rotation of a body that its "
-            'supports leave free; use element="isoparametric"'
-        )
+    if trace.geometry_order > trace.order:  # else elements contain their own coordinates
+        forces = _by_body(space.A @ own_values, of_unknown, combinations)
+        terms = _largest(values * space.diagonal[:, None])
+        if (_largest(forces) > STRAIN_FORCE * terms).any():
+            raise ValueError(
+                "curved superparametric elements do not contain the rotation of a body that its "
+                'supports leave free; use element="isoparametric"'
+            )
     return FreeMotions(space, bodies, combinations, nodal, values)
 
 
@@ -216,8 +218,8 @@ def _largest(columns: Columns) -> Array:
     return dense(abs(columns).max(axis=0)).ravel()
 
 
-def _node_values(space: Space, bodies: Bodies) -> Array:
-    """Translations and rotations, (d * n, m), of the body of each node or unknown, as its values.
+def _node_values(space: Space, bodies: Bodies, body: Index) -> Array:
+    """Translations and rotations, (d * n, m), of the `body` (n,) of each node, as its values.
 
     Translations are 1, rotations 1 at half the body's size.
     """
@@ -234,7 +236,6 @@ def _node_values(space: Space, bodies: Bodies) -> Array:
             place[:, axis] = field.vec.FV().NumPy()
     nodes = trace.nodes[space.nodal]
     place[nodes], one[nodes] = trace.positions(space.nodal), 1.0
-    body = body_of_unknown(space, bodies)[:n]
     moves = one[:, None, None] * np.eye(d)
     arm = (place - one[:, None] * bodies.middle[body]) / bodies.size[body, None]
     both = np.concatenate([moves, rotations(arm)], axis=2)

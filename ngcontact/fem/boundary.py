@@ -519,11 +519,11 @@ def connected_bodies(trace: BoundaryTrace) -> Bodies:
     piece = trace.arrays.pieces
     pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
     materials = trace.mesh.GetMaterials()
-    names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
-    d = trace.model.dim
-    ends = [trace.curve[number == b].reshape(-1, d) for b in range(len(names))]
+    material, d = np.zeros(len(pieces), dtype=np.intp), trace.model.dim
+    material[number] = trace.body
+    ends = [trace.curve[number == b].reshape(-1, d) for b in range(len(pieces))]
     return Bodies(
-        names=[names[b] for b in range(len(names))],
+        names=[materials[k] for k in material.tolist()],
         middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),
         size=np.array([np.ptp(x, axis=0).max() / 2 for x in ends]),
         of_segment=number,

@@ -7,7 +7,7 @@ import numpy as np
 from netgen.meshing import IdentificationType
 
 from ..arrays import Array, Integers, Mask
-from ..problem import PIECES, MeshArrays
+from ..problem import PIECES, POSITION, MeshArrays
 from .cad import CadEdge, cad_edges
 from .faces import curved_facets
 
@@ -94,9 +94,8 @@ def check_curves(mesh: ng.Mesh) -> None:
 
 def _straightened(mesh: ng.Mesh) -> bool:
     """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
-    position = ng.CF((ng.x, ng.y, ng.z))
-    off = ng.BoundaryFromVolumeCF(position) - position
-    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
+    off = ng.BoundaryFromVolumeCF(POSITION) - POSITION
+    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, POSITION))
     return bool(missed > CURVE_DISTANCE**2 * size)
 
 

@@ -1,5 +1,6 @@
 """Plausibility of data and results: warnings, with what to do about each."""
 
+from .data import Contradiction as Contradiction
 from .data import contradictions as contradictions
 from .data import warn_of_implausible as warn_of_implausible
 from .pairs import pair_warnings as pair_warnings

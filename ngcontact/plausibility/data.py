@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ngsolve as ng
@@ -93,15 +94,17 @@ def _extremes(problem: Problem, trace: BoundaryTrace) -> tuple[Array, Array, Ind
     return low, high, least, most
 
 
-def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
+def warn_of_implausible(
+    problem: Problem, mesh: ng.Mesh, order: int, contradictory: Sequence[Contradiction]
+) -> None:
     """Warn of elements that lock, loads that are nowhere, supports that contradict, laws that jump.
 
-    Once, of the first mesh; of supports at the first corner of each two.
+    Once, of the first mesh; of `contradictory` supports at the first corner of each two.
     """
     warn_of_locking(problem, mesh, order)
     warn_of_data(problem, mesh, order)
     warned: set[tuple[str, str]] = set()
-    for one in contradictions(problem, mesh):
+    for one in contradictory:
         if one.supports not in warned:
             warned.add(one.supports)
             common = ("corner", "edge")[problem.dim - 2]
