@@ -129,8 +129,13 @@ class BorderedSystems:
         SingularError
             The matrix is singular to working precision.
         """
-        self._reach(active, anchor)
+        self._improve(self._reach(active, anchor), COARSE_RESIDUAL)
         return self.y.copy(), self.force.copy()
+
+    def approach(self, active: Mask) -> Array:
+        """Minimiser (n,) for `active` (m,) after one correction, as a step of another iteration."""
+        self._reach(active, None)
+        return self.y.copy()
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
         """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
@@ -172,7 +177,7 @@ class BorderedSystems:
         return stiffness
 
     def _reach(self, active: Mask, anchor: Anchor | None) -> Border:
-        """The system of an active set, solved."""
+        """The system of an active set, after one correction."""
         p, base = self.program, self._base_near(active, anchor)
         self.system = system = self._bordered(base, active, anchor)
         self.force[~active] = 0.0
@@ -184,7 +189,6 @@ class BorderedSystems:
         residual = self.unbalanced(active, anchor)
         self.scale = max(self.scale, system.largest(residual))
         self._correct(system, residual, COARSE_RESIDUAL)
-        self._improve(system, COARSE_RESIDUAL)
         return system
 
     def _base_near(self, active: Mask, anchor: Anchor | None) -> Base:

@@ -28,6 +28,7 @@ from ...lagrange import gauss, lagrange
 from .cells import Cells
 
 GAP_NOISE = 1e-14  # of a gap, relative to the displacements on both sides
+POSITION_NOISE = 4 * np.finfo(float).eps  # ... and to the largest coordinate
 INSIDE_SIDE = 1e-14  # parameters of vertices, as seen from a side
 SAME_PLACE = 1e-7  # parameters of a segment that are one place
 DATA_DEGREE = 16  # of polynomials that stand for gaps and prescribed displacements on a side
@@ -40,7 +41,8 @@ NARROW_SIDE = 0.1  # of the sides beside it, a side between them on which r does
 PARALLEL_MOTION = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 POINTS, WEIGHTS = gauss(2 * DATA_DEGREE)
 # From values at `POINTS` to Legendre's coefficients, and to values at Gauss-Lobatto points.
-TO_LEGENDRE = np.linalg.inv(legendre.legvander(2 * POINTS - 1, DATA_DEGREE))
+LEGENDRE = legendre.legvander(2 * POINTS - 1, DATA_DEGREE)
+TO_LEGENDRE = np.linalg.inv(LEGENDRE)
 TO_LOBATTO = np.linalg.inv(lagrange(DATA_DEGREE, POINTS))
 TO_ENDS = TO_LOBATTO[[0, -1]]
 NEWTON_STEPS = 12
@@ -261,7 +263,8 @@ class FacingSides:
     gap: Array  # (k, j) of u_h, lengths
     lift: Array  # (k, j) r, what w adds to it
     lifted_gap: Array  # (k, n) Bernstein coefficients >= 0 of gap + r, or near to it where r is 0
-    closed: Mask  # (k,) sides in contact as a whole
+    touched: Mask  # (k, 2) ends that sides in contact as a whole share
+    pressed: Mask  # (k, n) coefficients of p* that are likely to be positive
     share: Array  # (k, 2) of what w adds to the gap, that the secondary takes at t = 0 and t = 1
     slots: Index  # (r,) sides of the secondary of which nothing faces, as over a slot
 
@@ -293,7 +296,7 @@ class FacingSides:
         `values` (k, j, c) are those opposite to the secondary's.
         """
         across = np.linalg.solve(legendre.legvander(2 * self.there - 1, DATA_DEGREE), values)
-        return np.asarray(legendre.legvander(2 * POINTS - 1, DATA_DEGREE) @ across)
+        return np.asarray(LEGENDRE @ across)
 
 
 def facing_sides(
@@ -331,7 +334,11 @@ def facing_sides(
     # are not the same on two sides of a narrow gap.
     nodes = found.gap[keep, 1:-1] @ TO_LOBATTO.T
     nodes[:, [0, -1]] = np.where(found.faces[keep][:, [0, -1]], ends, nodes[:, [0, -1]])
-    gap = nodes @ lagrange(DATA_DEGREE, POINTS).T
+    # No Legendre polynomials that only round-off of coordinates has: w would have their degrees.
+    modes = nodes @ (TO_LEGENDRE @ lagrange(DATA_DEGREE, POINTS)).T
+    largest = np.maximum.accumulate(np.abs(modes[:, ::-1]), axis=1)[:, ::-1]
+    modes[largest <= POSITION_NOISE * np.abs(cells.vertices).max()] = 0.0
+    gap = modes @ LEGENDRE.T
     other, there = np.full(len(side), -1), np.zeros(gap.shape)
     if contact.primary is not None:
         middle = gap.shape[1] // 2
@@ -370,6 +377,9 @@ def facing_sides(
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
         after, lift = _lifted_gap(vertices, gap, closed, total == 0, narrow, degree)
+    pressed = np.repeat((closed | (after.min(axis=1) <= 0))[:, None], of_pressure + 1, axis=1)
+    touched = np.isin(vertices, vertices[closed])
+    pressed[:, [0, -1]] |= touched
     return FacingSides(
         pair=pair,
         side=side,
@@ -381,7 +391,8 @@ def facing_sides(
         gap=gap,
         lift=lift,
         lifted_gap=after,
-        closed=closed,
+        touched=touched,
+        pressed=pressed,
         share=most[vertices],
         slots=away,
     )
@@ -443,7 +454,8 @@ def guide_sides(
         gap=gap,
         lift=-gap,
         lifted_gap=np.zeros((len(side), degrees[1] + 1)),
-        closed=np.ones(len(side), dtype=bool),
+        touched=np.ones((len(side), 2), dtype=bool),
+        pressed=np.ones((len(side), degrees[0] + 1), dtype=bool),
         share=np.ones((len(side), 2)),
         slots=side[:0],
     )

@@ -50,7 +50,7 @@ def force_bar(
         values, coefficients = _excess(cells, G, f, e)
         excess.append(values)
         c.append(coefficients)
-        kappa = max(kappa, _bare(cells, f, c[-1]), _beside(cells, displacement, G, f, e))
+        kappa = max(kappa, _bare(f, c[-1]), _beside(cells, displacement, G, f, e))
     if not kappa < np.inf:
         raise ValueError(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
@@ -126,13 +126,11 @@ def _excess(cells: Cells, G: ng.GridFunction, f: FacingSides, e: Array) -> tuple
     return excess, c
 
 
-def _bare(cells: Cells, f: FacingSides, c: Array) -> float:
+def _bare(f: FacingSides, c: Array) -> float:
     """The least kappa with which nothing of `c` is left at vertices that no closed side shares."""
-    ends, room = cells.ends[f.side], f.lifted_gap[:, [0, -1]]
-    bare = ~np.isin(ends, ends[f.closed]) & (c[:, [0, -1]] != 0)
-    size = np.abs(c[:, [0, -1]])
+    room, size = f.lifted_gap[:, [0, -1]], np.abs(c[:, [0, -1]])
     ratio = np.divide(size, room, out=np.full_like(room, np.inf), where=room > 0)
-    return float(ratio[bare].max(initial=0.0))
+    return float(ratio[~f.touched & (size > 0)].max(initial=0.0))
 
 
 def _beside(

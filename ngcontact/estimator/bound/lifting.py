@@ -29,7 +29,9 @@ from .polynomials import CORNERS, DERIVATIVES, derivatives
 from .tractions import BoundaryData
 
 SIDE_DEGREES = 3  # steps from `DATA_DEGREE` down, by which degrees on sides may differ
-AMOUNT_ERROR = 1e-10  # of the largest amount, and of d: by so much polynomials on sides may miss
+# By so much, or by less than `LIFTING_NOISE` makes noise, polynomials on sides may miss the largest
+# amount and d.
+AMOUNT_ERROR = 1e-10
 LIFTING_NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
 SAME_DIRECTION = 1e-8  # sine of the angle between directions at a vertex that are one
 INCONSISTENT_AMOUNT = 1e-9  # of what is asked for at a vertex, relative to it
@@ -122,6 +124,7 @@ def lifting_of(
     fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
     fixed[np.asarray(away, dtype=np.intp)] = False
     unit = np.concatenate(largest).max()
+    error = max(AMOUNT_ERROR, least / unit)
     for one in prescribed:
         fixed[one.side] = False
         both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
@@ -129,7 +132,7 @@ def lifting_of(
         for n in (*range(DATA_DEGREE - SIDE_DEGREES, degree, -SIDE_DEGREES), degree):
             carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
             lower = lagrange(n, gauss_lobatto(DATA_DEGREE)) @ carry
-            asked[(np.abs(both - lower @ both) <= AMOUNT_ERROR).all(axis=(1, 2))] = n
+            asked[(np.abs(both - lower @ both) <= error).all(axis=(1, 2))] = n
         degrees[one.side] = np.maximum(degrees[one.side], asked)
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
     nodes = np.unique(np.concatenate([own.ravel() for _, own, _ in stiffness]))

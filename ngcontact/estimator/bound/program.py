@@ -24,7 +24,6 @@ from ...linalg import change_of_basis, cholesky, lower_half, shared
 from ...qp import (
     BorderedSystems,
     QuadraticProgram,
-    SingularError,
     minimise,
     no_null_space,
     pinned_null_space,
@@ -43,7 +42,7 @@ UNBALANCED_LOAD = 1e-5
 # Diagonal of K relative to the largest: coordinates on the axis are 0 to round-off, measured 1e-62.
 AXIS_STIFFNESS = np.finfo(float).eps ** 2
 LIMIT_SLACK = 1.1  # ratio of a force to its limit up to which it stays as it is
-DIAGONAL_SHIFT = 1e-12  # of the diagonal, for vertices where tractions depend on each other
+DIAGONAL_SHIFT = 1e-13  # of the diagonal, for vertices where tractions depend on each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ class DualProgram:
         moments, y = moments - idle, np.zeros(len(p.b))
         if limits is None:
             low, high = np.where(p.equality, -np.inf, 0.0), np.full(len(p.g), np.inf)
-            active = _joined([np.repeat(x.closed, x.psi.shape[1]) for x in self.lines], bool)
+            active = _joined([x.pressed for x in self.lines], bool)
         else:
             high = _joined([x.mass * limit for x, limit in zip(self.lines, limits, strict=True)])
             low, active = -high, high > 0
@@ -146,12 +145,9 @@ class DualProgram:
         return Balanced(s, pressure, left, float(np.abs(idle).sum()))
 
     def _answer(self, load: Array, active: Mask) -> Array:
-        """Unknowns (d,) under a `load` (d,), 0 at the rows `active` (m,); near to them at least."""
+        """Unknowns (d,) under a `load` (d,), nearly, 0 at the rows `active` (m,)."""
         self.systems.restart(replace(self.program, b=load, g=np.zeros_like(self.program.g)))
-        try:
-            return self.systems.solve(active)[0]
-        except SingularError:
-            return self.systems.y
+        return self.systems.approach(active)
 
     def _on_free_motions(self, load: Array) -> Array:
         """The part (d,) of a `load` (d,) that does work on free motions.
