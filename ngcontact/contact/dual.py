@@ -30,6 +30,7 @@ from ..arrays import Array, Index, Mask, from_triplets, rows_of
 from ..fem import BoundaryTrace, FacetTrace
 from ..lagrange import lagrange
 from ..problem import Contact, MeshArrays
+from ..reference import triangle
 from .facing import (
     SLIVER,
     WHOLE_SHARE,
@@ -65,19 +66,27 @@ Held = Callable[[ContactLine], Mask]
 
 
 def _dual_basis(
-    trace: BoundaryTrace, contact: Contact, segments: Index, faces: Mask, weight: Array, mass: Array
+    trace: BoundaryTrace,
+    contact: Contact,
+    segments: Index,
+    faces: Mask,
+    weight: Array,
+    mass: Array,
+    at_nodes: Array,
 ) -> tuple[Array, Index]:
-    """Dual bases of `segments` (k,) over their facing parts: psi = change phi, `change` (k, q, q).
+    """Dual bases of `segments` (k,) over their facing parts: psi = change chi, `change` (k, q, q).
 
     And the numbers (j,) of segments whose rows have several unknowns. In the plane psi may be those
     of the hats of the ends, or one constant. D_e, the integrals `weight` (k, q) of phi over the
     facing parts, are set to what the rows weigh, 0 for none. Segments that are `faces` (k,) have
-    such parts, and `mass` (k, q, q) are the integrals of phi_i phi_j over these.
+    such parts, and `mass` (k, q, q) are the integrals of chi_i chi_j over these, chi the functions
+    phi themselves or, in space, those of `_on_parts`, with phi = `at_nodes` chi.
     """
     change, order = np.zeros_like(mass), trace.order
     if trace.model.dim == 3:  # whose facets that face in part have functions that are not negative
         weight[~trace.weighs(segments)] = 0.0
-        change[faces] = weight[faces][:, :, None] * np.linalg.inv(mass[faces])
+        inverse = np.linalg.solve(at_nodes[faces].transpose(0, 2, 1), np.linalg.inv(mass[faces]))
+        change[faces] = weight[faces][:, :, None] * inverse
         return change, np.zeros(0, dtype=np.intp)
     whole, s = segment_weights(trace, contact, segments), trace.places(segments)
     sliver = faces & (weight.sum(axis=1) < MIN_COVERED * whole.sum(axis=1))  # a row at one end
@@ -100,6 +109,37 @@ def _dual_basis(
     return change, in_part[turn <= SLIVER]
 
 
+def _on_parts(
+    trace: BoundaryTrace, segments: Index, pieces: FacingPieces, each: Index, s: Array
+) -> tuple[Array, Array]:
+    """Lagrange's polynomials chi (r, q) of triangles as large as the facing parts of facets.
+
+    At `s` (r, 3) on facets by number `each` (r,) among `segments` (k,); and phi (k, q, q) at the
+    nodes of the triangles: phi times chi are phi. The mass matrix of phi itself is close to
+    singular where little faces. Triangles have the centre and second moments of the `pieces`.
+    """
+    k, nodes, corners = len(segments), triangle.nodes(trace.order), pieces.corners[..., :2]
+    own = np.bincount(pieces.local, pieces.share, k)
+    share, some = (pieces.share / own[pieces.local])[:, None], own > 0
+    middle, moment = np.full((k, 2), 1 / 3), np.tile(np.eye(2), (k, 1, 1))
+    middle[some], moment[some] = 0.0, SLIVER**2 * np.eye(2)
+    np.add.at(middle, pieces.local, share * corners.mean(axis=1))
+    x = corners - middle[pieces.local, None]
+    x = np.concatenate([x, 3 * x.mean(axis=1, keepdims=True)], axis=1)
+    np.add.at(moment, pieces.local, share[:, None] * (x.transpose(0, 2, 1) @ x))
+    x = triangle.nodes(1)[:, :2] - 1 / 3
+    frame = np.linalg.cholesky(moment) @ np.linalg.inv(np.linalg.cholesky(x.T @ x))
+
+    def barycentric(x: Array) -> Array:
+        return np.concatenate([x, 1 - x.sum(axis=-1, keepdims=True)], axis=-1)
+
+    places = middle[:, None] + (nodes[:, :2] - 1 / 3) @ frame.transpose(0, 2, 1)
+    phi = trace.shapes(segments.repeat(len(nodes)), barycentric(places).reshape(-1, 3))
+    own_places = np.einsum("rij,rj->ri", np.linalg.inv(frame)[each], s[:, :2] - middle[each])
+    chi = triangle.lagrange(trace.order, barycentric(own_places + 1 / 3))
+    return chi, phi.reshape(k, len(nodes), -1).transpose(0, 2, 1)
+
+
 def _integrals(
     trace: BoundaryTrace, contact: Contact, segments: Index, pieces: FacingPieces
 ) -> tuple[Array, Array, sp.csr_array, Array]:
@@ -118,20 +158,23 @@ def _integrals(
     w = jacobian(trace, contact, segment, s).reshape(r, g) * pieces.share[:, None] * weights
     d = interpolated_rays(trace, contact, segments, each.local, s)
     there, eps = opposite(trace, x, d, each.facing, each.opposite)
-    met = np.isfinite(np.column_stack([there, eps])).all(axis=1)
-    if not met.all():  # beside the curved facet, whose corners were clipped
-        w, eps, there[~met] = w * met.reshape(r, g), np.where(met, eps, 0.0), each.opposite[~met]
+    met = np.isfinite(eps)  # else beside the curved facet, whose corners were clipped
+    w, eps = w * met.reshape(r, g), np.where(met, eps, 0.0)
     if contact.gap is not None:
         eps = prescribed_gap(contact, trace, segment, s, x)
     phi = trace.shapes(segment, s).reshape(r, g, q)
     phi_there = trace.shapes(each.facing, there).reshape(r, g, q)
     weight, gap, mass = np.zeros((k, q)), np.zeros((k, q)), np.zeros((k, q, q))
+    chi, at_nodes = phi, mass
+    if trace.model.dim == 3:
+        chi, at_nodes = _on_parts(trace, segments, pieces, each.local, s)
+        chi = chi.reshape(r, g, q)
     np.add.at(weight, pieces.local, np.einsum("rg,rgi->ri", w, phi))
-    np.add.at(gap, pieces.local, np.einsum("rg,rgi->ri", w * eps.reshape(r, g), phi))
-    np.add.at(mass, pieces.local, np.einsum("rg,rgi,rgj->rij", w, phi, phi))
+    np.add.at(gap, pieces.local, np.einsum("rg,rgi->ri", w * eps.reshape(r, g), chi))
+    np.add.at(mass, pieces.local, np.einsum("rg,rgi,rgj->rij", w, chi, chi))
     faces = pieces.covered(k) > SLIVER
-    change, hats = _dual_basis(trace, contact, segments, faces, weight, mass)
-    facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, phi, phi_there)
+    change, hats = _dual_basis(trace, contact, segments, faces, weight, mass, at_nodes)
+    facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, chi, phi_there)
     own_part = change[hats] @ mass[hats] - weight[hats, :, None] * np.eye(q)
     blocks = np.concatenate([facing_part, -own_part])
     row = np.concatenate([pieces.local, hats])[:, None] * q + np.arange(q)
@@ -174,8 +217,9 @@ def with_dual_rows(
     segments all match keeps the row at its node to the last bit.
 
     Rows of nodes `held` along their directions would have to be unknowns of the primary, of which
-    a coarser one has too few. The psi of these nodes are added to those of nodes beside, so that
-    the sum of all stays 1, as at the ends of interfaces in mortar methods.
+    a coarser one has too few; those of nodes of solids of whose weight less than `MIN_COVERED`
+    faces extrapolate, with large entries of both signs. The psi of these nodes are added to those
+    of nodes beside, so that the sum of all stays 1, as at the ends of interfaces in mortar methods.
     """
     if len(line.facing) == 0:
         return line, facing
@@ -192,12 +236,19 @@ def with_dual_rows(
     pieces = divided(trace, contact, segments, line.facing, distances(trace, line)[chosen])
     D, gaps, coupling, least = _integrals(trace, contact, segments, pieces)
     here, own = (rows >= 0) & (D > 0), rows
+    nodal, whole, reached = np.zeros((3, m))
+    np.add.at(nodal, line.rows[matched], line.shares[matched])
+    np.add.at(whole, line.rows[line.rows >= 0], line.shares[line.rows >= 0])
+    np.add.at(reached, rows[here], D[here])
+    if trace.model.dim == 3:
+        fixed[:-1] |= (reached > 0) & (nodal + reached < MIN_COVERED * whole)
     if fixed.any():
         rows = np.where(here, _passed_on(line, np.where(here, rows, -1), fixed), rows)
         slot = np.flatnonzero(rows != own)
         at = np.concatenate([line.node[x.ravel()[slot]] for x in (rows, own)])
         values = np.outer([1.0, -1.0], D.ravel()[slot]).ravel()
-        coupling = coupling + from_triplets(values, np.tile(slot, 2), at, coupling.shape)
+        passed = from_triplets(values, np.tile(slot, 2), at, coupling.shape)
+        coupling = coupling + passed
     point, points = rows[here], line.rows.copy()
     points[chosen] = rows
     cosine = np.ones(len(point))
@@ -210,27 +261,34 @@ def with_dual_rows(
     weights = np.where(here, D, 0.0)
     weights[here] *= across
     covered[chosen] = weights
-    nodal, dual, gap, whole = np.zeros((4, m))
+    dual, gap = np.zeros((2, m))
     least -= LARGEST_SLOPE * trace.lengths(segments)
     lowest = np.where(facing, line.gap, np.inf)
     np.minimum.at(lowest, point, least[here.nonzero()[0]])
-    np.add.at(nodal, line.rows[matched], line.shares[matched])
     np.add.at(dual, point, weights[here])
     np.add.at(gap, point, gaps[here] * cosine)
-    np.add.at(whole, line.rows[line.rows >= 0], line.shares[line.rows >= 0])
     at_nodes = dual == 0
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
     lowest[at_nodes] = -np.inf
     scale, shape = across / weight[point], (m, coupling.shape[0])
-    means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
+    mean = from_triplets(scale, point, np.flatnonzero(here), shape)
+    position = line.position
+    if isinstance(trace, FacetTrace):  # where forces act, so that moments balance
+        place = np.zeros((coupling.shape[1], 3))
+        place[trace.nodes[segments]] = trace.positions(segments)
+        if trace.bernstein.any():
+            position = np.where(trace.bernstein[line.node, None], place[line.node], position)
+        if fixed.any():
+            position = position - mean @ passed @ place
     line = replace(
         line,
         rows=points,
         gap=np.maximum(share * np.where(share > 0, line.gap, 0.0) + gap / weight, lowest),
         # By matched segments, without one of which the ends alone face, over a slot at order 1.
         weight=np.where(at_nodes, np.where(nodal > 0, nodal, line.weight), nodal + dual),
-        coupling=(sp.diags_array(share) @ line.coupling + means).tocsr(),
+        position=position,
+        coupling=(sp.diags_array(share) @ line.coupling + mean @ coupling).tocsr(),
         means=~at_nodes,
         faces=faces,
         covered=covered,

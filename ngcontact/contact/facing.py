@@ -119,10 +119,14 @@ def opposite(
     """Parameters (k,) at which rays meet segments `facing` (k,) known to face, and distances (k,).
 
     Of `points` (k, d) along the `directions` (k, d), by Newton's method from `near` (k,); in the
-    plane until no step is larger than `settled`.
+    plane until no step is larger than `settled`. Rays may miss a curved facet whose plane they
+    meet: the distance is NaN, the parameter that of `near`.
     """
     if trace.model.dim == 3:
-        return casting.onto(points, directions, trace.curve, facing, near)
+        there, distance = casting.onto(points, directions, trace.curve, facing, near)
+        lost = ~np.isfinite(np.column_stack([there, distance])).all(axis=1)
+        there[lost], distance[lost] = near[lost], np.nan
+        return there, distance
     s = crossings(points, across(directions), trace.curve, facing, near, settled)
     return s, ((at(trace.curve, facing, s) - points) * directions).sum(axis=1)
 

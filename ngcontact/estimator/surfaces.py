@@ -157,6 +157,8 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     if zone.contact.primary is not None:
         x = trace.point(own.segment, own.s)
         there, distance = opposite(trace, x, d, facing, each.opposite)
+        weight = weight * np.isfinite(distance)
+        distance = np.where(np.isfinite(distance), distance, 0.0)
         across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
         u = u - trace.evaluate(solution.displacement, facing, there)
         other = solution.traction(facing, there) / across[:, None]

@@ -152,8 +152,9 @@ def _cells(file: Any) -> tuple[list[_Cells], list[_Cells]]:
             continue
         if kind.startswith(SOLIDS):
             raise ValueError(
-                f'{count} cells of kind "{kind}" are solids, and bodies lie in the plane: mesh a '
-                "section of them (gmsh -2)"
+                f'{count} cells of kind "{kind}" are solids, and bodies that are read lie in the '
+                "plane: mesh a section of them (gmsh -2); tetrahedra of format 2.2 and first order "
+                "are read by ngsolve.Mesh(netgen.read_gmsh.ReadGmsh(path))"
             )
         if kind not in CORNERS:
             raise ValueError(

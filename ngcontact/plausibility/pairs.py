@@ -86,9 +86,9 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
     """Messages on implausible results, by the kind of warning and the number of the pair.
 
     On every mesh: fixed directions far from the normals, bodies that are drawn far apart, a given
-    gap that contradicts the drawing, strains that are not small, and bodies that move rigidly. On
-    the `last` mesh also: contact zones that the mesh does not resolve, penetration between contact
-    points, and loads that bring no pair into contact. Solids that are drawn far apart are not
+    gap that contradicts the drawing, and strains that are not small. On the `last` mesh also:
+    contact zones that the mesh does not resolve, penetration between contact points, bodies that
+    move rigidly, and loads that bring no pair into contact. Solids that are drawn far apart are not
     checked.
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
@@ -114,7 +114,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
             messages["penetration"] = _penetration(solution, state, peak)
         name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
-    if max(largest, default=0.0) <= noise and (text := _unresisted(solution)):
+    if last and max(largest, default=0.0) <= noise and (text := _unresisted(solution)):
         found["rigid", 0] = text
     if last and not found and (text := _all_open(solution)):
         found["open", 0] = text

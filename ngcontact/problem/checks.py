@@ -54,6 +54,7 @@ ELEMENTS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra, pr
 OVERLAP_SHARE = 0.5  # of the smaller of two bodies, from which they lie on top of each other
 SKEW = (0.83, 0.29, 0.47)  # a direction in which no mesh has edges
 SAMPLE_PLACES = 200  # of a connected piece that are looked for in another one
+PLANE_EXTENT = 1e-6  # extent along z of faces that lie in a plane, relative to those in it
 FLATNESS = 16 * np.finfo(float).eps  # measure of an element over its longest edge^d, without height
 RADIAL_ROUND_OFF = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
 
@@ -64,6 +65,12 @@ def dimension_of(geometry: OCCGeometry | ng.Mesh) -> int:
         return int(geometry.dim)
     solids = geometry.shape.solids
     if not solids:
+        x, y, z = np.ptp([tuple(v.p) for v in geometry.shape.vertices] or np.zeros((1, 3)), axis=0)
+        if z > PLANE_EXTENT * max(x, y):
+            raise ValueError(
+                "the geometry has no solids, and its faces lie in no plane z = const: give solids "
+                "with their volume, or faces in the plane z = 0"
+            )
         return 2
     faces = Counter(face for solid in solids for face in solid.faces)
     if len(faces) < len(set(geometry.shape.faces)):
@@ -98,6 +105,10 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
         )
     if mesh.ne == 0:
         raise ValueError("mesh has 0 elements: generate it first")
+    for number, name in enumerate(mesh.GetMaterials()):
+        if not name:
+            what = "face" if dim == 2 else "solid"
+            raise ValueError(f'material region {number} has the name "": give every {what} a name')
     view = MeshArrays(mesh)
     if others := view.without_simplices():
         right = "it must be a triangulation" if dim == 2 else "it must consist of tetrahedra"
@@ -120,6 +131,26 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
         raise ValueError(
             "the mesh is curved without a geometry, and normals of its facets are none of the "
             "body's: give the OCC geometry, or a mesh of first order"
+        )
+
+
+def check_numbers(view: MeshArrays) -> None:
+    """Refuse vertices of no element, as those of second order have, and facets that occur twice."""
+    unused = np.bincount(view.elements.ravel(), minlength=len(view.vertices)) == 0
+    if unused.any():
+        first = int(np.argmax(unused))
+        raise ValueError(
+            f"mesh has {np.count_nonzero(unused)} vertices of no element: number {first} at "
+            f"{view.vertices[first].tolist()}; leave them out, as ngmesh.Compress() does, and give "
+            "elements of first order, without middles of edges"
+        )
+    _, first_facet, count = np.unique(view.keys(view.facets), return_index=True, return_counts=True)
+    if (count > 1).any():
+        corners = view.vertices[view.facets[first_facet[np.argmax(count > 1)]]].tolist()
+        raise ValueError(
+            f"{np.count_nonzero(count > 1)} sides of elements occur twice in the boundaries of the "
+            f"mesh, one with the vertices {corners}: what acts there would count twice; give every "
+            "side one name"
         )
 
 
@@ -172,12 +203,9 @@ def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) ->
 
 
 def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
-    """Refuse bodies without a name, and those in none of the masks (r,) of materials."""
+    """Refuse bodies in none of the masks (r,) of materials."""
     covered = np.logical_or.reduce(list(materials.values()))
     for number, name in enumerate(mesh.GetMaterials()):
-        if not name:
-            what = "face" if mesh.dim == 2 else "solid"
-            raise ValueError(f'material region {number} has the name "": give every {what} a name')
         if not covered[number]:
             raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
 
@@ -219,8 +247,8 @@ def check_tractions(
         if load.dim == 1 and (mask & inner).any():
             raise ValueError(
                 f'{label} is a pressure, and "{names[int(np.argmax(mask & inner))]}" lies inside a '
-                "body or between two that are glued, where no normal is the outward one: give the "
-                "traction as a pair; if it should bound a cut, draw what is cut off anticlockwise, "
+                "body or between two that are glued, where no normal is the outward one: give a "
+                "vector as traction; if it should bound a cut, draw what is cut off anticlockwise, "
                 "as OCC needs it"
             )
         if (mask & shared).any():

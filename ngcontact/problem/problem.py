@@ -188,6 +188,8 @@ class Problem:
         """
         checks.check_mesh(mesh, self.dim)
         view, names = MeshArrays(mesh), mesh.GetBoundaries()
+        if isinstance(self.geometry, ng.Mesh) or len(view.vertices) != mesh.nv:
+            checks.check_numbers(view)
 
         def regions(argument: str, patterns: Iterable[str]) -> checks.Masks:
             bodies = argument in ("materials", "force", "strain")

@@ -174,6 +174,8 @@ def unit_vector(value: Any, what: str) -> tuple[float, ...]:
     right = "give a pair of numbers, like (0, -1), three for solids, one direction for all"
     if isinstance(value, str | ng.CoefficientFunction):
         raise TypeError(f"{what} = {value!r:.60}: {right}")
+    if isinstance(value, Sequence | np.ndarray) and len(value) not in TUPLES:
+        raise ValueError(f"{what} = {value!r:.60} has length {len(value)}: {right}")
     dim = 3 if isinstance(value, Sequence | np.ndarray) and len(value) == 3 else 2
     entries = [scalar_data(entry, what) for entry in entries_of(value, what, dim)]
     vector = tuple(entry for entry in entries if isinstance(entry, float))

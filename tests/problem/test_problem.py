@@ -144,7 +144,7 @@ def test_bodies_are_the_connected_pieces(mesh):
         ({"primary": ["b"]}, TypeError, r"primary = \['b'\]: give a region name"),
         ({"primary": None}, ValueError, '"a" has primary=None and gap=None: .* needs gap'),
         ({"direction": (0, 0)}, ValueError, r"direction = \(0\.0, 0\.0\): give a vector from"),
-        ({"direction": (1, 0, 0, 0)}, ValueError, "has length 4: give a pair"),
+        ({"direction": (1, 0, 0, 0)}, ValueError, "has length 4: give a pair.*three for solids"),
         ({"direction": (math.inf, 1)}, ValueError, "direction = inf: give a finite"),
         ({"direction": (ng.x, 1)}, TypeError, r"direction = \(.*: give a pair of numbers"),
         ({"gap": math.nan}, ValueError, "gap = nan: give a finite number"),
