@@ -9,7 +9,7 @@ import pytest
 from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 
 from drivers.reference import axisymmetric_cases, cases
-from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import blocks, disc
 from ngcontact.geometries.region import compound
 from tests.given_meshes import two_blocks
@@ -167,9 +167,23 @@ def test_corners_of_infinite_stress_are_named():
     assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
     # The ends are corners of the punch: 0.5, to round-off of a sum of segments.
     assert abs(half - 0.5) <= q["contact area"].error + 1e-14
-    words = "away from where it is infinite: (-0.5, 0), (0.5, 0)"
+    words = "  0.1 away from where it is infinite: (-0.5, 0), (0.5, 0)"
     assert str(q["peak pressure"]).endswith(words)
     assert "at (5.5, 0)" in str(replace(q["energy"], place=np.array([5.5, 2e-15])))
+
+
+def test_figures_away_from_corners_are_those_of_the_scene():
+    """On every mesh the pressure a tenth of the side from its ends, however large elements are."""
+    *_, fine = adapt(cases.flat_punch(), tolerance=1e-3)
+    order = fine.points[:, 0].argsort()
+    expected = np.interp(0.4, fine.points[order, 0], fine.pressure[order])
+    runs = [solve(cases.flat_punch(), maxh=0.5, order=order) for order in (1, 2, 4)]
+    runs += [list(adapt(cases.flat_punch(), tolerance=tol))[-1] for tol in (0.05, 0.01)]
+    for solution in (*runs, fine):
+        without_proof(solution)
+        peak = solution.quantities()["peak pressure"]
+        assert abs(peak.value - expected) <= peak.error
+    assert peak.error < 0.1 * expected  # of the fine one: measured 0.04
 
 
 @pytest.mark.parametrize("swap", [False, True])

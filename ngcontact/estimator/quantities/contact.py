@@ -5,7 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index, distances_along
+from ...arrays import Array, Index, Mask, distances_along
 from ...contact import ContactState, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies, prescribed_components
 from ...lagrange import gauss
@@ -37,14 +37,15 @@ def peak_of(
     """
     name, line, pressure = "peak pressure", pair.line, pair.pressure
     boundary, rows = solution.discrete.space.trace, line.rows
-    infinite = np.unique(_pressed_corners(corners, line.position), axis=0)
-    away = ~corners.near(line.position, pressed=True)
+    singular = corners.distinct(_on_line(corners, line.position))
+    corners = corners.distinct(corners.pressed)
+    away = ~corners.near(line.position)
     if not (pair.active & away).any():
-        return unknown(name, np.nan if pair.active.any() else 0.0, infinite=infinite)
+        return unknown(name, np.nan if pair.active.any() else 0.0, singular=singular)
     at = int(np.where(away, pressure, -np.inf).argmax())
     peak, place = float(pressure[at]), line.position[at]
     if solution.relative_error_estimate > 1:
-        return unknown(name, peak, place, infinite)
+        return unknown(name, peak, place, singular)
     factor = LONE_STRESS_FACTOR if star is None else STRESS_FACTOR
     off = factor * _off_stress(pair, boundary, solution.stress)
     if star is not None:
@@ -56,19 +57,20 @@ def peak_of(
     # The peak is on segments with a point in contact, or beside such.
     touched = rows[pair.touched]
     near = np.isin(rows, touched[touched >= 0]).any(axis=1)
-    counts = ~corners.near(boundary.point(segment, s), pressed=True)
-    counts &= np.repeat(near, len(SAMPLES))
+    # The largest may lie between the last sample that counts and the next one, at the reach.
+    step = boundary.lengths(segment) / (len(SAMPLES) - 1)
+    counts = ~corners.near(boundary.point(segment, s), step) & np.repeat(near, len(SAMPLES))
     error = error_of_largest(peak, samples[counts], errors[counts])
-    return Quantity(name, peak, error, "estimated", place, infinite=infinite)
+    return Quantity(name, peak, error, "estimated", place, singular=singular)
 
 
-def _pressed_corners(corners: Singular, points: Array) -> Array:
-    """Corners (j, 2) at which bodies press on each other, on the line through `points` (m, 2)."""
-    places = corners.places[corners.pressed]
-    if not len(points) or not len(places):
-        return places[:0]
-    away = np.linalg.norm(places[:, None] - points, axis=2).min(axis=1)
-    return places[away <= CORNER_RANGE * np.ptp(points, axis=0).max()]
+def _on_line(corners: Singular, points: Array) -> Mask:
+    """Those corners (k,) at which bodies press on each other, on the line through `points`."""
+    if not len(points):
+        return np.zeros(len(corners.places), dtype=bool)
+    away = np.linalg.norm(corners.places[:, None] - points, axis=2).min(axis=1)
+    near = away <= CORNER_RANGE * np.ptp(points, axis=0).max()
+    return np.asarray(near & corners.pressed)
 
 
 def _off_star(pair: ContactState, star: Array) -> Array:

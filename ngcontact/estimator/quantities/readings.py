@@ -116,7 +116,8 @@ class Measured(Guaranteed):
         "approach", "energy", "von Mises". The bar of the energy is proved, and that of the force
         as a rule beside its estimate. Where no bound is known all are estimates, and a
         `ContactWarning` and a note below the table say why. Where corners make a stress infinite
-        the row names them; its value is the largest farther away.
+        the row names them; its value is the largest farther away than a tenth of the way to the
+        next corner of the drawing.
 
         Of solids forces, with "force, z", area, pressures, of which the peak is that of
         `pressure_field`, and energy. Levels of `adapt` from the third on have errors: the larger of

@@ -70,13 +70,10 @@ def singular_corners(
         uneven[i] = not ends.any()
     straight = (low == high) & (np.abs(angle - np.pi) <= STRAIGHT_TURN)  # nothing changes
     found = ~straight & ((angle > critical + STRAIGHT_TURN) | uneven)
-    size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
-    for x, least in zip(place[found], h[found].tolist(), strict=True):
-        away = np.linalg.norm(place - x, axis=1)
-        reach.append(
-            max(CORNER_REACH * float(away[away > CORNER_DISTANCE * size].min(initial=size)), least)
-        )
-    return Singular(place[found] + 0.0, np.array(reach), (high == PRESSED)[found])
+    size = float(np.ptp(trace.curve, axis=(0, 1)).max())
+    away = np.linalg.norm(place[found, None] - place, axis=2)
+    way = np.where(away > CORNER_DISTANCE * size, away, size).min(axis=1, initial=size)
+    return Singular(place[found] + 0.0, CORNER_REACH * way, (high == PRESSED)[found])
 
 
 def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
@@ -157,7 +154,8 @@ def largest_von_mises(
     `equilibrated` has the values of the equilibrated stress, if there is one, at places (k, 2) of
     elements (k,).
     """
-    name, mesh, infinite = "von Mises", solution.mesh, corners.distinct
+    name, mesh = "von Mises", solution.mesh
+    singular = corners.distinct(np.ones(len(corners.places), dtype=bool))
     m = CONSTANT if solution.order == 1 else DIVISIONS
     steps = [(i / m, j / m) for i in range(m + 1) for j in range(m + 1 - i) if 3 * i != m or i != j]
     places = np.array([(1 / 3, 1 / 3), *steps])
@@ -169,12 +167,12 @@ def largest_von_mises(
     stress = np.hstack([s.reshape(-1, 4)[:, [0, 3, 1]], normal.reshape(-1, 1)])
     mises, away = von_mises(stress), ~corners.near(xy)
     if not away.any():
-        return unknown(name, np.nan, infinite=infinite)
+        return unknown(name, np.nan, singular=singular)
     at = int(np.where(away, mises, -np.inf).argmax())
     value, place = float(mises[at]), xy[at]
     alone = equilibrated is None and mesh.ne == 1  # nothing to compare with
     if solution.relative_error_estimate > 1 or alone:
-        return unknown(name, value, place, infinite)
+        return unknown(name, value, place, singular)
     high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= STRESS_SHARE * value)
     some = np.repeat(high, n)
     off = _jumps(mesh, xy, mises, n)[some]
@@ -194,8 +192,11 @@ def largest_von_mises(
         apart = np.where(known, np.abs(von_mises(other) - mises[some]), 0.0)
         off = np.maximum(JUMP_FACTOR * off, apart)
     off = MISES_FACTOR * np.repeat(off.reshape(-1, n).max(axis=1), n)
-    error = error_of_largest(value, mises[some & away], off[away[some]])
-    return Quantity(name, value, error, "estimated", place, infinite=infinite)
+    # The largest may lie between the last point that counts and the next one, at the reach.
+    size = np.ptp(xy.reshape(-1, n, 2), axis=1).max(axis=1)
+    counts = ~corners.near(xy, np.repeat(size / m, n))[some]
+    error = error_of_largest(value, mises[some][counts], off[counts])
+    return Quantity(name, value, error, "estimated", place, singular=singular)
 
 
 def _jumps(mesh: ng.Mesh, points: Array, mises: Array, n: int) -> Array:

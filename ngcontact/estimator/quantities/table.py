@@ -15,6 +15,37 @@ POINT_ROUND_OFF = 1e-12  # of coordinates that are printed, relative to the larg
 
 
 @dataclass(frozen=True, eq=False)
+class Singular:
+    """Corners of infinite stress."""
+
+    places: Array  # (k, 2), lengths
+    reach: Array  # (k,), how far from each the stress is its own, lengths
+    pressed: Mask  # (k,), corners at which bodies press on each other
+
+    def distinct(self, chosen: Mask) -> Singular:
+        """The `chosen` (k,), each place once where several bodies meet."""
+        places, number = np.unique(self.places[chosen], axis=0, return_inverse=True)
+        reach, pressed = np.zeros(len(places)), np.zeros(len(places), dtype=bool)
+        np.maximum.at(reach, number.ravel(), self.reach[chosen])
+        np.logical_or.at(pressed, number.ravel(), self.pressed[chosen])
+        return Singular(places, reach, pressed)
+
+    def near(self, points: Array, step: Array | float = 0.0) -> Mask:
+        """Mask (m,) of the `points` (m, 2) within the reach of a corner, less a `step` (m,)."""
+        result = np.zeros(len(points), dtype=bool)
+        for place, r in zip(self.places, self.reach, strict=True):
+            result |= np.linalg.norm(points - place, axis=1) + step <= r
+        return result
+
+    def __str__(self) -> str:
+        """How far from which of them a value is the largest."""
+        k, (low, high) = len(self.places) - 3, (self.reach.min(), self.reach.max())
+        away = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+        corners = ", ".join(map(_point, self.places[:3])) + (f" and {k} more" if k > 0 else "")
+        return f"{away} away from where it is infinite: {corners}"
+
+
+@dataclass(frozen=True, eq=False)
 class Quantity:
     """One figure and its bar.
 
@@ -33,8 +64,9 @@ class Quantity:
         Where it is.
     proved : float or None
         The proved error beside an estimated one; None where none is proved.
-    infinite : ndarray (k, 2) or None
-        Corners at which the true one is infinite; the value is the largest away from them.
+    singular : Singular or None
+        Corners at which the true one is infinite, and their `reach` (k,), a tenth of the way to
+        the next corner of the drawing: the value is the largest farther away.
     """
 
     name: str
@@ -43,7 +75,12 @@ class Quantity:
     kind: Literal["guaranteed", "estimated", "none"]
     place: Array | None = None
     proved: float | None = None
-    infinite: Array | None = None
+    singular: Singular | None = None
+
+    @property
+    def infinite(self) -> Array | None:
+        """Corners (k, 2) at which the true one is infinite."""
+        return None if self.singular is None else self.singular.places
 
     @property
     def guaranteed(self) -> bool:
@@ -62,40 +99,16 @@ class Quantity:
         at = "" if self.place is None else f"  at {_point(self.place)}"
         if self.kind == "estimated" and self.proved is not None:
             at += f"  (guaranteed +- {self.proved:.2g})"
-        if self.infinite is not None and len(self.infinite):
-            several = f" and {len(self.infinite) - 3} more" if len(self.infinite) > 3 else ""
-            corners = ", ".join(map(_point, self.infinite[:3]))
-            at += f"  away from where it is infinite: {corners}{several}"
+        if self.singular is not None and len(self.singular.places):
+            at += f"  {self.singular}"
         return f"{self.name:22s} {self.value:14.7g} {bar}  {self.kind:10s}{at}".rstrip()
 
 
-@dataclass(frozen=True, eq=False)
-class Singular:
-    """Corners of infinite stress."""
-
-    places: Array  # (k, 2), lengths
-    reach: Array  # (k,), how far from each the stress is its own, or not resolved, lengths
-    pressed: Mask  # (k,), corners at which bodies press on each other
-
-    @property
-    def distinct(self) -> Array:
-        """Places (j, 2), each once where several bodies meet."""
-        return np.unique(self.places, axis=0)
-
-    def near(self, points: Array, pressed: bool = False) -> Mask:
-        """Mask (m,) of the `points` (m, 2) within the reach of a corner."""
-        result = np.zeros(len(points), dtype=bool)
-        for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
-            if of_contact or not pressed:
-                result |= np.linalg.norm(points - place, axis=1) <= r
-        return result
-
-
 def unknown(
-    name: str, value: float, place: Array | None = None, infinite: Array | None = None
+    name: str, value: float, place: Array | None = None, singular: Singular | None = None
 ) -> Quantity:
-    """A figure without a bar, at `place` (2,), infinite at `infinite` (k, 2)."""
-    return Quantity(name, value, math.nan, "none", place, infinite=infinite)
+    """A figure without a bar, at `place` (2,), infinite at the `singular` corners."""
+    return Quantity(name, value, math.nan, "none", place, singular=singular)
 
 
 def error_of_largest(value: float, samples: Array, errors: Array) -> float:
