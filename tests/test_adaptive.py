@@ -123,7 +123,6 @@ BAD = [
     ("theta", 1.01, ValueError),
     ("theta", "0.5", TypeError),
     ("tolerance", 0, ValueError),
-    ("tolerance", "1e-3", TypeError),
     ("tolerance", 5, ValueError),  # percent is not meant, nor an absolute error
     ("max_dofs", 0, ValueError),
     ("max_dofs", "many", TypeError),
@@ -143,13 +142,6 @@ BAD = [
 def test_bad_arguments_of_adapt_are_refused_at_the_call(name, value, error):
     with pytest.raises(error, match=rf"{name}={value!r}|{name}={value}"):
         adapt(cases.one_transition().problem, **{name: value})
-
-
-@pytest.mark.usefixtures("no_work")
-def test_a_first_mesh_beyond_the_budget_is_refused_with_both_numbers():
-    problem = cases.one_transition().problem
-    with pytest.raises(ValueError, match="has 1204 unknowns, more than max_dofs=1000"):
-        adapt(problem, maxh=0.28, order=3, max_dofs=1000)
 
 
 def test_a_tolerance_out_of_reach_is_told():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane
+from netgen.occ import Compound, OCCGeometry
 
 from ngcontact import (
     Contact,
@@ -22,6 +22,7 @@ from ngcontact import (
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries.region import DOWN, LEFT, RIGHT, UP, body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
+from tests.discrete.test_equilibrium import loose
 from tests.scenes import distance, rectangle, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes
@@ -65,44 +66,30 @@ def test_a_slot_of_any_width_leaves_pressures_right(order, swap, primaries):
         assert distance(d, result, UNIFORM) < EXACT
 
 
-def pin_at_the_bottom(*pairs):
-    """A pin that touches its hole, and that contact alone holds against a slanting body force."""
-    hole = WorkPlane().Circle(1.0).Face()
-    plate = WorkPlane().MoveTo(-3, -3).Rectangle(6, 6).Face() - hole
-    pin = WorkPlane().MoveTo(0, -1e-3).Circle(0.999).Face()
-    for face, name in ((plate, "plate"), (pin, "pin")):
-        face.faces.name = name
-        face.edges.name = name
-    for edge in plate.edges:
-        edge.name = "hole" if abs(edge.center.x) + abs(edge.center.y) < 1.1 else "rim"
-    return Problem(
-        geometry=OCCGeometry(Compound([plate, pin]), dim=2),
-        materials={"pin|plate": Elastic(E=210e3, nu=0.3)},
-        displacement={"rim": (0, 0)},
-        force={"pin": (0.3, -1.0)},
-        contact=[Contact(*pair) for pair in pairs],
-    )
+LOOSE = replace(loose((0.3, -1.0)), contact=[Contact("outer_contact", "inner_contact")])
 
 
 def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
     """What is solved is the problem with roles the other way round, on the same mesh."""
-    given = pin_at_the_bottom(("hole", "pin"))
-    mesh, solved = first_mesh(given, 0.35), solving.minimise_energy
+    mesh, solved = first_mesh(LOOSE, 0.35), solving.minimise_energy
 
-    def fails_with_the_hole(discrete, active):
-        if discrete.problem.contact[0].secondary == "hole":
+    def fails_with_the_outer_one(discrete, active):
+        if discrete.problem.contact[0].secondary == "outer_contact":
             raise ConvergenceError("the active set did not settle")
         return solved(discrete, active)
 
-    monkeypatch.setattr(solving, "minimise_energy", fails_with_the_hole)
-    with pytest.warns(ContactWarning, match=r'given in Contact\("hole", "pin"\).*roles="auto"'):
-        solution = solve(given, mesh, order=2)
-    assert [(c.secondary, c.primary) for c in solution.problem.contact] == [("pin", "hole")]
-    right = solve(replace(given, contact=[given.contact[0].swapped()]), mesh, order=2)
+    monkeypatch.setattr(solving, "minimise_energy", fails_with_the_outer_one)
+    with pytest.warns(
+        ContactWarning, match=r'given in Contact\("outer_.*", "inner_.*"\).*roles="auto"'
+    ):
+        solution = solve(LOOSE, mesh, order=2)
+    [pair] = solution.problem.contact
+    assert pair.sides == ["inner_contact", "outer_contact"]
+    right = solve(replace(LOOSE, contact=[pair]), mesh, order=2)
     np.testing.assert_allclose(solution.energy, right.energy, rtol=1e-9)  # round-off, amplified
     assert np.array_equal(solution.active, right.active)
     np.testing.assert_allclose(solution.contact_force(), right.contact_force(), rtol=1e-9)
-    area = ng.Integrate(1.0, solution.mesh, definedon=solution.mesh.Materials("pin"), order=4)
+    area = ng.Integrate(1.0, solution.mesh, definedon=solution.mesh.Materials("inner"), order=4)
     load = area * np.array((0.3, -1.0))
     np.testing.assert_allclose(solution.contact_force(), -load, atol=1e-9 * abs(load).max())
 
@@ -198,7 +185,6 @@ def test_overlaps_between_points_in_contact_are_not_told(settle, order):
 
 def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
     """The error of the roles that were given is raised, as where the others fail, too."""
-    problem = pin_at_the_bottom(("hole", "pin"))
     calls = []
 
     def fail(discrete, active):
@@ -206,12 +192,11 @@ def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
         raise ConvergenceError(f"attempt {len(calls)}")
 
     monkeypatch.setattr(solving, "minimise_energy", fail)
-    mesh = first_mesh(problem, 0.5)
+    mesh = first_mesh(LOOSE, 0.5)
     with pytest.raises(ConvergenceError, match="attempt 1"):
-        solve(problem, mesh, order=2)
-    assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
+        solve(LOOSE, mesh, order=2)
+    assert [pairs[0].secondary for pairs in calls] == ["outer_contact", "inner_contact"]
     calls.clear()
-    problem = replace(problem, contact=[replace(problem.contact[0], gap=0.01)])
     with pytest.raises(ContactError):
-        solve(problem, mesh, order=2)
+        solve(replace(LOOSE, contact=[replace(LOOSE.contact[0], gap=0.01)]), mesh, order=2)
     assert len(calls) <= 1

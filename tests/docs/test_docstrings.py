@@ -9,7 +9,6 @@ or one and "each".
 import ast
 import inspect
 import re
-from itertools import pairwise
 
 import pytest
 
@@ -22,6 +21,7 @@ TYPES |= {"sparray", "spmatrix", "csr_array", "csc_array"}
 # "(m, 2)", "(n,)", "(3 b, r)", "(k, order + 1)", but not "(x, y)" nor "(Judice, Pires 1994)".
 _TERM = r"(?:\d+|\d*\s?(?:[a-wA-Z]|ne|nv|dim|(?:geometry_)?order|degree)(?!\w))"
 _DIMENSION = rf"(?:\.\.\.|{_TERM}(?:\s?[-+*]\s?{_TERM})*)"
+RETURNED = ("Returns", "Yields")
 SHAPE = re.compile(rf"\({_DIMENSION},(?:\s{_DIMENSION},)*(?:\s{_DIMENSION})?\)")
 
 
@@ -42,34 +42,16 @@ def arrays_in(annotation):
             return sum(map(arrays_in, ast.iter_child_nodes(annotation)))
 
 
-def sections(docstring):
-    """Text by the numpydoc sections of a docstring; "" is what stands before them."""
-    parts = re.split(r"^(\w[\w ]*)\n-+$", docstring, flags=re.MULTILINE)
-    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
-
-
-def entries(section):
-    """Names and text of each entry of a section: ``segment, s : ndarray (k,)`` and below."""
-    heads = list(re.finditer(r"^(\S[^:\n]*?)(?: : .*)?$", section, re.MULTILINE))
-    bounds = [*(head.start() for head in heads), len(section)]
-    for head, at in zip(heads, pairwise(bounds), strict=True):
-        yield re.split(r",\s*", head.group(1)), section[slice(*at)]
-
-
 def in_words(name):
     """A name in backticks and its shape; several names may share one: "`a`, `b` and `c` (m, 2)"."""
     return rf"`{name}`+(?:(?:,| and|, and)\s`+\w+`+)*\s{SHAPE.pattern}"
 
 
 def entry(docstring, name):
-    """What a docstring says of a parameter or an attribute; "" if nothing."""
-    parts = sections(docstring)
-    for title in ("Parameters", "Attributes"):
-        for names, text in entries(parts.get(title, "")):
-            if name in names:
-                return text
-    found = re.search(in_words(name), parts[""])
-    return found.group() if found else ""
+    """What a docstring says of a name, in an entry of a section or in words; "" if nothing."""
+    head = rf"^(?:\w+, )*{name}(?:, \w+)*(?: : .*)?(?:\n(?:    .*)?)*"
+    found = re.finditer(rf"{head}|{in_words(name)}", docstring, re.MULTILINE)
+    return " ".join(match.group() for match in found)
 
 
 def comment(lines, field):
@@ -87,12 +69,13 @@ def comment(lines, field):
 
 def shapes_returned(docstring):
     """Number of arrays that a docstring gives shapes of, those of parameters aside."""
-    parts, told = sections(docstring), 0
-    for title in ("Returns", "Yields"):
-        for names, text in entries(parts.get(title, "")):
-            told += len(names) * bool(SHAPE.search(text))
-    words = re.sub(in_words(r"\w+"), "", parts[""])
-    shapes = len(SHAPE.findall(words))
+    words, *parts = re.split(r"^(\w[\w ]*)\n-+$", docstring, flags=re.MULTILINE)
+    returned = "".join(parts[k + 1] for k, title in enumerate(parts) if title in RETURNED)
+    told = sum(
+        len(names.split(",")) * bool(SHAPE.search(entry(returned, names)))
+        for names in re.findall(r"^(\S[^:\n]*?)(?: : .*)?$", returned, re.MULTILINE)
+    )
+    shapes = len(SHAPE.findall(re.sub(in_words(r"\w+"), "", words)))
     return float("inf") if shapes and re.search(r"\beach\b", words) else told + shapes
 
 
@@ -187,6 +170,6 @@ def test_geometries_say_their_units(name):
     parameters = inspect.signature(function).parameters.items()
     numbers = [parameter for parameter, kind in parameters if "float" in str(kind.annotation)]
     assert numbers
-    if "Lengths are in any consistent unit" not in sections(docstring)[""]:
+    if "Lengths are in any consistent unit" not in docstring:
         kinds = ("length", "angle", "none")
         assert not [n for n in numbers if not has_unit(entry(docstring, n), *kinds)]

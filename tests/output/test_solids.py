@@ -46,7 +46,7 @@ def test_cells_are_the_curved_elements(order, tmp_path):
     # VTK's first two vertices are Netgen's second and first.
     rule = ng.IntegrationRule([(share[1], share[0], share[2])], [1.0])
     expected = ng.CF((ng.x, ng.y, ng.z))(mesh.MapToAllElements({ng.TET: rule}, ng.VOL))
-    for k in range(grid.n_cells):
+    for k in range(0, grid.n_cells, 7):
         x, weights = np.zeros(3), np.zeros(nodes.cells.shape[1])
         grid.GetCell(k).EvaluateLocation(pyvista._vtk.reference(0), share[1:], x, weights)
         np.testing.assert_allclose(x, expected[k], atol=1e-13)

@@ -142,7 +142,6 @@ def test_bodies_are_the_connected_pieces(mesh):
     [
         ({"secondary": 3}, TypeError, "secondary = 3: give a region name"),
         ({"primary": ["b"]}, TypeError, r"primary = \['b'\]: give a region name"),
-        ({"primary": None}, ValueError, '"a" has primary=None and gap=None: .* needs gap'),
         ({"direction": (0, 0)}, ValueError, r"direction = \(0\.0, 0\.0\): give a vector from"),
         ({"direction": (1, 0, 0, 0)}, ValueError, "has length 4: give a pair.*three for solids"),
         ({"direction": (math.inf, 1)}, ValueError, "direction = inf: give a finite"),
@@ -163,10 +162,7 @@ def test_contact_refuses(arguments, error, message):
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"geometry": "disc"}, TypeError, "geometry is a str: give an OCCGeometry or ngsolve.Mesh"),
         ({"materials": {}}, ValueError, "materials = {}: give every body an Elastic or a Hooke"),
-        ({"materials": {"block": 210e9}}, TypeError, 'materials "block" = 2.*: give an Elastic'),
-        ({"displacement": {"top": 0}}, TypeError, 'displacement "top" = 0: give a pair'),
         ({"displacement": {"top": (0, 0, 0)}}, ValueError, r"\(0, 0, 0\) has length 3: give a"),
         ({"displacement": {"top": ng.x}}, ValueError, r'"top" is .* dims \(\): give a 2-vector'),
         ({"displacement": {"top": (0, math.nan)}}, ValueError, '"top" = nan: give a finite'),
@@ -183,7 +179,6 @@ def test_contact_refuses(arguments, error, message):
         ({"sliding": ""}, ValueError, 'sliding = "": give a region name'),
         ({"model": 2}, TypeError, "model = 2: give one of the strings"),
         ({"model": "solid"}, ValueError, "model = 'solid' is for solids: choose one of"),
-        ({"model": "3d"}, ValueError, 'model "3d" is unknown: choose one of .*plane stress'),
     ],
 )
 def test_problem_refuses(make, changes, error, message):
@@ -197,15 +192,12 @@ OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"materials": {"blok": STEEL}}, r'materials "blok" .*mean "block"\? .*\[\'block\', \'pun'),
-        ({"force": {"bottom": (0, 1)}}, r'force "bottom" selects no region; .*\[\'block\', \'pun'),
         ({"traction": {"punch": 1}}, 'traction "punch" .* is a body, and boundaries are asked'),
         ({"traction": {"left|rigth": 1}}, 'traction "rigth" .*did you mean "right"'),
         ({"sliding": "(a|b)x"}, r'sliding "\(a\|b\)x" selects no region; there are \[\'block_top'),
         ({"sliding": "left("}, r'"left\(" is no name and no regular expression'),
         ({"contact": [TOUCH, Contact("xyz", gap=0)]}, r'contact\[1\].secondary "xyz" sel.*there a'),
         ({"contact": [Contact("top", "blocktop")]}, r'\[0\].primary "blocktop" .*mean "block_top"'),
-        ({"materials": {"block": STEEL}}, r'body "punch" has no material: add materials'),
         ({"materials": {"block": STEEL, ".*": STEEL}}, r'"block" is both in .*"block" and in .*"'),
         ({"force": {"block": (0, 1), "b.*": (0, 1)}}, r'"block" is both in force .* every region '),
         ({"displacement": {"left": (0, 0), "left|top": (0, 1)}}, '"left" is both in .* region onc'),
@@ -231,7 +223,6 @@ OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
             {"contact": [TOUCH, Contact(gap=lambda x, y: x + np.nan, **OBSTACLE)]},
             r"contact\[1\]\.gap of .* = nan at \(.*, 1\): must be finite",
         ),
-        ({"contact": [Contact(gap=lambda x, y: 1.0, **OBSTACLE)]}, r"gap of .* returns shape \(\)"),
     ],
 )
 def test_check_refuses(make, mesh, changes, message):

@@ -14,9 +14,10 @@ import pytest
 
 import ngcontact
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Contact, Elastic, Hooke, adapt, solve
 from tests.scenes import unmatched_blocks
-from tests.solids.meshes import boxes
+from tests.solids.test_patch import blocks as cubes
+from tests.solids.test_patch import pressed
 
 ROOT = Path(__file__).parents[2]
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -38,11 +39,6 @@ def varying():
     return two_blocks(materials={"upper": Hooke(C), "lower": stiffer})
 
 
-def on_a_mesh():
-    mesh = ng.Mesh(unmatched_blocks().GenerateMesh(maxh=0.5))
-    return two_blocks(geometry=mesh)
-
-
 def refined_by_hand():
     """A given mesh of which NGSolve halved some edges, and keeps them among those in use."""
     mesh = ng.Mesh(unmatched_blocks().GenerateMesh(maxh=0.5))
@@ -52,20 +48,6 @@ def refined_by_hand():
     return two_blocks(geometry=mesh)
 
 
-def adapted_solids():
-    bodies = boxes(
-        ("lower", (0, 0, 0), (2, 2, 1), (2, 2, 1)), ("upper", (0, 0, 1), (1, 1, 2), (1, 1, 1))
-    )
-    problem = Problem(
-        geometry=bodies,
-        materials={"lower|upper": SOFT},
-        displacement={"lower_bottom": (0, 0, 0)},
-        traction={"upper_top": 0.01},
-        contact=[Contact("upper_bottom", "lower_top")],
-    )
-    return list(adapt(problem, order=2, max_dofs=3000))[-1]
-
-
 SCENES = {
     "pressed disc": lambda: solve(cases.pressed_disc(), maxh=0.4, order=3),
     "adapted": lambda: list(adapt(cases.partly_opening_block(), order=2, max_dofs=1500))[-1],
@@ -73,9 +55,8 @@ SCENES = {
         two_blocks(contact=[replace(LINE, gap=rising)]), maxh=0.5, order=2
     ),
     "laws": lambda: solve(varying(), maxh=0.5, order=2),
-    "a mesh that is given": lambda: solve(on_a_mesh(), order=2),
     "a mesh that NGSolve refined": lambda: solve(refined_by_hand(), order=2),
-    "adapted solids": adapted_solids,
+    "adapted solids": lambda: list(adapt(pressed(cubes(1, 1, width=2)), max_dofs=3000))[-1],
     "free motion": lambda: solve(
         two_blocks(displacement={"bottom": (0, 0)}, traction={"top": 0.01}), maxh=0.5
     ),

@@ -11,6 +11,7 @@ from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.contact import FacingPieces, divided
 from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import stress_of
+from ngcontact.problem import MeshArrays, move_vertices
 from ngcontact.reference import triangle
 from tests.solids.meshes import boxes
 
@@ -55,27 +56,33 @@ def stresses(mesh, stress):
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2), (4, 1)])
 @pytest.mark.parametrize("direction", [True, False])
 def test_uniform_pressure(order, secondary, counts, direction):
-    """Of turned bodies, with all that is told of it: exact, as constants are in the span of psi."""
-    mesh = blocks(*counts, turn=TURN)
+    """Of turned bodies in any unit, and all that is told: constants are in the span of psi."""
+    mesh, length = blocks(*counts, turn=TURN), {"upper": 1e-9, "lower": 1e9}[secondary]
+    move_vertices(mesh, length * MeshArrays(mesh).vertices)
     solution = solve(pressed(mesh, secondary, direction, turn=TURN), order=order)
     name, _, sign = SIDES[secondary]
     expected = TURN @ np.diag([0.0, 0.0, -1.0]) @ TURN.T
     # Measured 2e-13.
     assert np.abs(stresses(mesh, solution.stress) - expected).max() < 1e-10
     assert np.abs(solution.pressure - 1.0).max() < 1e-10
-    assert np.abs(solution.contact_force(0) + sign * TURN[:, 2]).max() < 1e-10
-    assert np.abs(solution.reactions["lower_bottom"] - TURN[:, 2]).max() < 1e-10
+    assert np.abs(solution.contact_force(0) / length**2 + sign * TURN[:, 2]).max() < 1e-10
+    assert np.abs(solution.reactions["lower_bottom"] / length**2 - TURN[:, 2]).max() < 1e-10
     assert solution.steps == [0]
     assert solution.work["gap_searches"] == (counts != (2, 2))
     assert solution.relative_error_estimate < 1e-12  # round-off: measured 4e-14
     assert solution.transitions() == []
-    assert solution.contact_area() == pytest.approx(1.0, rel=1e-12)
+    assert solution.contact_area() == pytest.approx(length**2, rel=1e-12)
     field = solution.pressure_field()
-    assert ng.Integrate((field - 1) ** 2 * ng.ds(name), mesh) < 1e-20
-    assert ng.Integrate(field * ng.ds, mesh) == pytest.approx(1.0, rel=1e-10)  # 0 elsewhere
+    assert ng.Integrate((field - 1) ** 2 * ng.ds(name), mesh) < 1e-20 * length**2
+    assert ng.Integrate(field * ng.ds, mesh) == pytest.approx(length**2, rel=1e-10)  # 0 elsewhere
     rows = solution.quantities()
-    for key in ("force", "contact area", "mean pressure", "peak pressure"):
-        assert rows[key].value == pytest.approx(1.0, rel=1e-10)
+    for key, unit in (
+        ("force", 2),
+        ("contact area", 2),
+        ("mean pressure", 0),
+        ("peak pressure", 0),
+    ):
+        assert rows[key].value == pytest.approx(length**unit, rel=1e-10)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
