@@ -112,15 +112,6 @@ def test_meshes_have_the_size_asked_for(name: str, kind: str, order: int):
         np.testing.assert_allclose(*sides, rtol=0, atol=1e-12 * sides[0][-1])
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_weights_integrate_polynomials(order: int):
-    ends = np.array([0.0, 0.3, 1.0, 1.2])
-    x = ends if order == 1 else np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
-    for degree in range(order + 1):
-        exact = 1.2 ** (degree + 1) / (degree + 1)
-        assert weights(x, order) @ x**degree == pytest.approx(exact, rel=1e-14)
-
-
 def test_readings_of_known_fields():
     x, a = np.linspace(0, 1, 41), 0.61
     gap = ((x - a) * (1 + x - a)).clip(0) ** 1.5

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
+from drivers.reference import axisymmetric
 from drivers.reference.curved import curved, rings
 from drivers.reference.manufactured import equilibrated, slits
 from drivers.reference.straight import hertz, patch, relative_energy_error, transition
-from drivers.reference.westergaard import effective_modulus
+from drivers.reference.westergaard import effective_modulus, moduli
 from ngcontact.geometries.region import compound
 from ngcontact.problem.material import Elastic
 from tests.scenes import rectangle
@@ -172,6 +173,34 @@ def test_hertz_known_values():
     # reference by x = a sin(t) in contact; here the quadrature of its ends leaves 5e-6 (measured)
     energies = [boundary_work(exact, body, HALVES[body]) for body in ("upper", "lower")]
     assert energies == pytest.approx([1.3069965e-4, 4.949773e-5], rel=1e-5)
+
+
+BALLS, SECTION = axisymmetric.hertz(UPPER, LOWER, radius=5.0, a=0.3), (0, 6, -6, 6)
+
+
+def test_balls_at_their_surface():
+    """Pressure, no shear, and the gap after deformation: Johnson 1985 (3.39), (3.42)."""
+    r, u = np.array([0.0, 0.1, 0.29, 0.3, 0.31, 0.5, 2.0]), {}
+    for body in SIDE:
+        stress = at(BALLS.stress[body], SECTION, r, 0 * r)
+        assert -stress[:, 1, 1] == pytest.approx(BALLS.pressure(r), abs=1e-14)
+        assert not stress[:, 0, 1].any()
+        u[body] = at(BALLS.displacement[body], SECTION, r, 0 * r)[:, 1]
+    opening = r**2 / 10 + u["upper"] - u["lower"]
+    assert opening == pytest.approx(BALLS.gap(r), abs=1e-14)
+    assert ((opening > 1e-12) == (r > 0.3)).all()
+
+
+def test_balls_known_values():
+    """F = 4/3 E* a^3 / R; on the axis at the surface rr = hoop = -(1 + 2 nu) / 2 p0."""
+    E, (stress, hoop) = effective_modulus(UPPER, LOWER), (BALLS.stress, BALLS.hoop)
+    assert pytest.approx(4 / 3 * E * 0.3**3 / 5) == BALLS.P
+    assert pytest.approx(1.5 * BALLS.P / (math.pi * 0.3**2)) == BALLS.p0
+    assert at(stress["upper"], SECTION, 0, 0)[0, 0, 0] == pytest.approx(-0.8 * BALLS.p0)
+    assert at(hoop["upper"], SECTION, 0, 0)[0] == pytest.approx(-0.8 * BALLS.p0)
+    sinking = axisymmetric.huber_displacement(UPPER, BALLS.p0, 0.3, "upper")
+    point = BALLS.P * (2 * 0.7 + 1) / (4 * math.pi * moduli(UPPER).mu * 6.0)  # Boussinesq
+    assert at(sinking, SECTION, 0, 6)[0, 1] == pytest.approx(point, rel=2 * (0.3 / 6) ** 2)
 
 
 def test_curved_tractions_and_gap():

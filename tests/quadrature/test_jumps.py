@@ -74,45 +74,17 @@ def test_elements_in_which_moduli_jump_are_refined_together():
         assert len(list(adapt(problem, order=2, max_dofs=10_000))) <= 8
 
 
-START, END = 3.0, 6.0
-
-
-def jumps_of(function, start=START, end=END, places=2048):
-    """Jumps of a function seen at some places, as on boundaries, and at both ends."""
-    inner = start + (end - start) * lattice(1, places)[:, 0]
-    t = np.concatenate([[start], inner, [end]])
-    return steps_along(function, t, function(t))
-
-
-@pytest.mark.parametrize("place", [3.0, 5.0, 5.2, 5.25, 5.7071, 5.999999])
-def test_jumps_are_found_where_they_are(place):
-    at, size = jumps_of(lambda x: np.cos(x) + 1e-3 * (x > place))
-    assert at == pytest.approx([place], abs=1e-12)
-    assert size == pytest.approx([1e-3], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    "smooth",
-    [
-        np.zeros_like,
-        np.cos,
-        lambda x: np.abs(x - 5.3),
-        lambda x: np.sqrt(np.maximum(x - 5.3, 0)),
-        lambda x: np.maximum(x - 5.3, 0) ** 0.1,
-        lambda x: np.arctan(1e6 * (x - 5.3)),
-    ],
-    ids=["zero", "smooth", "kink", "root", "tenth root", "steep"],
-)
-def test_what_is_continuous_does_not_jump(smooth):
-    assert jumps_of(smooth)[0].size == 0
-
-
 @pytest.mark.parametrize("length", [1.0, 3000.0])
 @pytest.mark.parametrize("size", [1.0, 1e-3])
 def test_small_jumps_are_found_beside_large_changes(length, size):
     """Of 1e-3 beside a change of 1, which in 2048 parts bends by 1e-6 from one to the next."""
     place = 0.70710678 * length
-    at, amount = jumps_of(lambda x: np.sin(3 * x / length) + size * (x > place), 0.0, length)
+
+    def function(x):
+        return np.sin(3 * x / length) + size * (x > place)
+
+    t = np.concatenate([[0.0], length * lattice(1, 2048)[:, 0], [length]])
+    at, amount = steps_along(function, t, function(t))
     assert at == pytest.approx([place], rel=1e-12)
     assert amount == pytest.approx([size], rel=1e-9)
 
