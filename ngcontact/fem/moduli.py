@@ -70,22 +70,24 @@ class Moduli:
 
 
 def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
-    """Moduli of elements `asked` (ne,) for, of all when left out."""
-    result = np.zeros((4, mesh.ne))
-    region = MeshArrays(mesh).bodies
+    """Moduli of elements `asked` (ne,) for, of all when left out; others may have none."""
+    region, of_region = MeshArrays(mesh).bodies, np.zeros((4, len(mesh.GetMaterials())))
+    varying = []
     for pattern, law in problem.materials.items():
-        at = body_mask(mesh, pattern)[region]
-        at = at if asked is None else at & asked
-        if not at.any():
-            continue
+        mask = body_mask(mesh, pattern)
         if varies(law):
+            varying.append((law, mask))
+        else:
+            of_region[:, mask] = _constant(law, problem.model, mesh)
+    result = of_region[:, region]
+    for law, mask in varying:
+        at = mask[region] if asked is None else mask[region] & asked
+        if at.any():
             rule = SAMPLES[mesh.dim]
             points = mesh.MapToAllElements(rule, ng.VOL).reshape(-1, len(rule))[at]
             law_there = law.voigt(problem.model)
             C = np.asarray(law_there(points.ravel()))
             result[:, at] = _moduli(C.reshape(-1, len(rule), *law_there.dims))
-        else:
-            result[:, at] = _constant(law, problem.model, mesh)
     return Moduli(*result)
 
 
