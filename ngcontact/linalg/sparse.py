@@ -167,14 +167,15 @@ def inverse_of(matrix: ng.BaseMatrix, free: ng.BitArray) -> ng.BaseMatrix:
 def cholesky(matrix: ng.BaseMatrix) -> Factor:
     """NGSolve's sparse Cholesky factorisation as what `bordered_systems` asks for."""
     right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
+    b_here, found = (vector.FV().NumPy() for vector in (right, solution))
 
     def factor(free: Mask) -> Solve:
         inverse = inverse_of(matrix, ng.BitArray(free))
 
         def solve(b: Array) -> Array:
-            right.FV().NumPy()[:] = b
+            b_here[:] = b
             solution.data = inverse * right
-            return solution.FV().NumPy().copy()
+            return np.array(found)
 
         return solve
 

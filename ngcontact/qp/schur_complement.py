@@ -89,7 +89,8 @@ class BorderedSystems:
     y: Array  # (n,) the last solution
     force: Array  # (m,) its multipliers
     reaction: Array  # (q,) forces of its pins that are prescribed
-    internal: Array  # (n,) K y of the last solution of which `unbalanced` was asked
+    asked: Array  # (n,) the last solution of which `unbalanced` was asked ...
+    internal: Array  # (n,) and K y of it
     scale: float  # largest force that a system was to balance
     factorizations: int  # since the last `restart`
     back_solves: int  # likewise; V-cycles count as such
@@ -112,7 +113,7 @@ class BorderedSystems:
         self.y = np.where(p.fixed, p.values, 0.0)
         if closed is not None and p.unit_rows:
             self.y[p.unknown[closed]] = p.g[closed]
-        self.force, self.internal, self.scale = np.zeros(p.g.size), np.zeros(p.b.size), 0.0
+        self.force, self.asked, self.scale = np.zeros(p.g.size), np.zeros(0), 0.0
         self.reaction = np.zeros(p.null_space.pins.size)
 
     def forget(self) -> None:
@@ -151,7 +152,8 @@ class BorderedSystems:
         The unit rows `active` (m,) first take as their force what is left at their unknowns.
         """
         p = self.program
-        self.internal = p.K @ self.y
+        if not np.array_equal(self.y, self.asked):  # it costs a quarter of a back-solve
+            self.asked, self.internal = self.y.copy(), p.K @ self.y
         residual = p.b - self.internal
         if anchor is not None:
             pins = p.null_space.pins
