@@ -403,6 +403,6 @@ class Estimated(Solved):
 
         With initial strains over the norm of the stress, of e(u_h) - e0.
         """
-        if self.error_estimate == 0 or self.stress_free:
+        if self.error_estimate == 0 or (self.problem.strain and self.stress_free):
             return 0.0
         return self.error_estimate / self.energy_norm if self.energy_norm > 0 else float("inf")

@@ -137,7 +137,12 @@ def fields(solution: Solved) -> dict[str, Field]:
 
     def stress(label: str, of: Callable[[Array], Array]) -> Field:
         """Field of the components of `full_stress`."""
-        return Field(label, "stress", lambda nodes: of(nodes.values(full_stress(solution))))
+
+        def values(nodes: Nodes) -> Array:
+            found = of(nodes.values(full_stress(solution)))
+            return 0.0 * found if solution.stress_free else found  # round-off has no colours
+
+        return Field(label, "stress", values)
 
     def displacement(label: str, of: Callable[[Array], Array]) -> Field:
         """Field of the components (k, d)."""
@@ -362,18 +367,22 @@ def _chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> f
     Of nodes at `place` (k, d), which `move` (k, d), of the bodies of numbers `body` (k,).
 
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
-    to the nearest node of another body errs on the side of a smaller factor.
+    to the nearest node of another body errs on the side of a smaller factor. Where nothing touches
+    half of each gap stays.
     """
     size = np.ptp(place, axis=0).max()
     largest = np.linalg.norm(move, axis=1).max()
     factor = 0.04 * size / largest if largest > 0 else 1.0
     points, gap = solution.points, solution.gap
-    if solution.active.any() and np.ptp(body) > 0:
-        overlap = 0.003 * max(np.ptp(points[solution.active], axis=0).max(), 0.01 * size)
+    if len(points) and np.ptp(body) > 0:
+        overlap = -gap / 2
+        if solution.active.any():
+            zone = np.ptp(points[solution.active], axis=0).max()
+            overlap = np.full(len(gap), 0.003 * max(zone, 0.01 * size))
         own = body[KDTree(place).query(points)[1]]
         for k in np.unique(own):
             initial = KDTree(place[body != k]).query(points[own == k])[0]
             closed = np.maximum(initial - gap[own == k], 1e-12 * size)
-            factor = min(factor, ((initial + overlap) / closed).min())
+            factor = min(factor, ((initial + overlap[own == k]) / closed).min())
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(1.0, *(k * power for k in (0.5, 1, 2, 5) if k * power <= factor)))

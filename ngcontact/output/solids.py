@@ -43,6 +43,7 @@ VERTICAL_COSINE = 0.5  # of the normal of a cut, up to which the view on it is f
 PIXELS = 1000  # of the longer side of an image
 ZONE_MARGIN = 0.4  # margin beside a contact zone over half its size
 CLOSE_UP_SIZE = 0.2  # half-size of a zone over that of the bodies, up to which it has a close-up
+NEAR_AXIS = 0.999  # cosine from which an axis is named after a coordinate: 2.6 degrees
 LEAST_SIZE = 0.02  # least half-size of a zone, over that of the surface
 SUBDIVISIONS = 2  # of curved elements, each of which halves their sides
 DRAWN_EDGE_ANGLE = 40  # degrees between faces, from which their edge is drawn
@@ -274,8 +275,8 @@ def _image(
 
 
 def _name(axis: Array, other: str) -> str:
-    """Name of the coordinate that an `axis` (3,) belongs to, or `other`."""
-    along = np.flatnonzero(np.abs(axis) > 1 - STRAIGHT)
+    """Name of the coordinate that an `axis` (3,) nearly has, or `other`."""
+    along = np.flatnonzero(np.abs(axis) > NEAR_AXIS)
     return AXES[along[0]] if along.size else other
 
 
@@ -321,7 +322,7 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         line = data.slice(normal=cut.normal, origin=cut.point - inside).connectivity()
         s, piece = np.asarray(line.points @ along), line.point_data["RegionId"]
         order, half = np.argsort(s), (1 + ZONE_MARGIN) * zone.half
-        names.append(_name(along, f"cut {k + 1}"))
+        names.append(_name(along, f"along ({', '.join(f'{x:.2g}' for x in along.round(2) + 0.0)})"))
         apart = 1 + np.flatnonzero(np.diff(piece[order]))  # a line ends where the surface does
         drawn = (np.insert(x[order], apart, np.nan) for x in (s / length, line["pressure"]))
         axes.plot(*drawn, color=COLOURS[k], label=names[-1])

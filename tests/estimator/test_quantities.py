@@ -6,7 +6,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
+from netgen.occ import Box, Circle, Compound, MoveTo, OCCGeometry, Y, Z
 
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
@@ -80,6 +80,27 @@ def test_the_table_reads():
         solution.quantities(1)
     with pytest.raises(TypeError, match="pair='first' is not an integer"):
         solution.contact_force("first")
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_body_without_contact_has_energy_and_stress(dim):
+    """Under a pressure 1 on a top of size 1; the base slides, in plane strain nu presses beside."""
+    body = rectangle("body", (0, 1), (0, 2), ["base", "side", "top", "side"])
+    geometry = compound(body) if dim == 2 else OCCGeometry(Box((0, 0, 0), (1, 1, 2)))
+    if dim == 3:
+        geometry.shape.solids.name = "body"
+        geometry.shape.faces.name = "side"
+        geometry.shape.faces.Min(Z).name, geometry.shape.faces.Max(Z).name = "base", "top"
+    law = Elastic(E=10.0, nu=0.3)
+    load = {"sliding": "base", "traction": {"top": 1.0}}
+    solution = solve(Problem(geometry, {"body": law}, **load), maxh=1.0, order=2)
+    q = solution.quantities()
+    assert q["energy"].value == pytest.approx(-(1 - (dim == 2) * law.nu**2) / law.E, rel=1e-12)
+    if dim == 2:
+        assert q["energy"].guaranteed
+        assert q["von Mises"].value == pytest.approx(np.sqrt(1 - law.nu + law.nu**2), rel=1e-12)
+    with pytest.raises(ValueError, match="pair=1 is not a contact pair; there is no contact"):
+        solution.quantities(1)
 
 
 def half_of_a_pin():

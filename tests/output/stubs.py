@@ -37,6 +37,7 @@ class Stub:
     problem: Any
     out_of_plane_stress: Any
     estimated: bool = False
+    stress_free: bool = False
 
     def __post_init__(self):
         count = len(self.points)

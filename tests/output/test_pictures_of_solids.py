@@ -6,7 +6,7 @@ import matplotlib.image
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Box, Compound, OCCGeometry, Pnt, Sphere, X, Z
+from netgen.occ import Axis, Box, Compound, OCCGeometry, Pnt, Sphere, X, Z
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solids, write_film
@@ -142,6 +142,25 @@ def test_upright_faces_in_contact_are_seen_from_above(sliding, tmp_path):
         np.testing.assert_allclose(line.get_ydata(), PRESSURE, rtol=1e-9)
     (image,) = panel(figure, "deformed").images
     assert 0.05 < (image.get_array() == 255).all(axis=2).mean() < 0.7  # bodies and background
+
+
+@pytest.mark.parametrize(
+    ("degrees", "words"),
+    [(1e-3, ["y", "z"]), (2.0, ["y", "z"]), (30.0, ["along (-0.5, 0.87, 0)", "z"])],
+)
+def test_cuts_are_named_after_the_axes_they_follow(degrees, words, tmp_path):
+    """Also where the mean of the normals is a little off one."""
+    shape = boxes(wall=[((-1, 0, 0), (0, 1, 1))], slab=[((0, 0, 0), (1, 1, 1))]).shape
+    problem = Problem(
+        geometry=OCCGeometry(shape.Rotate(Axis((0, 0, 0), Z), degrees)),
+        materials={"wall|slab": Elastic(E=1.0, nu=0.0)},
+        displacement={"wall_left": (0, 0, 0)},
+        traction={"slab_right": PRESSURE},
+        contact=[Contact("slab_left", "wall_right")],
+    )
+    figure = plot_solids(solve(problem, maxh=1.0, order=1), tmp_path / "a.png")
+    lines = panel(figure, "contact pressure").lines
+    assert [line.get_label() for line in lines[:2]] == words
 
 
 def test_a_zone_of_two_parts_is_cut_in_one_and_not_joined(tmp_path):

@@ -280,7 +280,7 @@ class Guaranteed(Estimated):
         With initial strains over the norm of the stress, of e(u_h) - e0.
         """
         bound, size = self._bound.bound, self.energy_norm
-        if self.stress_free:
+        if self.problem.strain and self.stress_free:
             return 0.0
         return bound / size if size > 0 else math.inf if bound > 0 else 0.0
 

@@ -41,7 +41,7 @@ from ..residual import Estimated
 from .contact import approach_of, area_in_contact, direction_of, ends_of, held_point_force, peak_of
 from .stresses import largest_von_mises, singular_corners
 from .surfaces import pressure_at_vertices, pressure_field
-from .table import Quantities, Quantity, unknown
+from .table import Quantities, Quantity, Singular, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
 # By order: 96 % of 118 are at most that, most of Hertz.
@@ -121,50 +121,23 @@ class Measured(Guaranteed):
 
         Of solids forces, with "force, z", area, pressures, of which the peak is that of
         `pressure_field`, and energy. Levels of `adapt` from the third on have errors: the larger of
-        the last two differences between levels.
+        the last two differences between levels. Without any pair energy and von Mises stress are
+        left, of solids the energy.
         """
-        state, boundary = state_of(self.pairs, pair), self.discrete.space.trace
+        state = state_of(self.pairs, pair) if self.pairs or pair != 0 else None
         if self.problem.dim == 3:
-            return quantities_of_solids(self, pair)
-        known = "_proved" in self.__dict__
+            return quantities_of_solids(self, state, pair)
+        boundary, known = self.discrete.space.trace, "_proved" in vars(self)
         proof, reason = self._proved
         if proof is None and not known:
             warn(f"{reason}; all errors of quantities() are estimates")
-        star = equilibrated = None
-        if proof is not None:
-            star = proof.pressure[pair].values(*boundary.at_nodes(state.line.segments))
-            equilibrated = proof.values
         corners = singular_corners(self.problem, boundary, self.pairs)
-        e, along = direction_of(self, pair)
-        e = e + 0.0  # no -0
-        largest = max(abs(float(one.force.sum())) for one in self.pairs)
-        factor = FORCE_FACTORS[min(self.order, max(FORCE_FACTORS))]
-        of_order = factor * self.relative_error_estimate**2 * largest
-        sum_error = of_order + held_point_force(state, boundary)
-        of_shape = float(np.linalg.norm(load_by_shape(self.problem, self.mesh)))
-        force = self.contact_force(pair)
-        parts = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}
-        forces = [Quantity(k, float(value), sum_error, "estimated") for k, value in parts.items()]
-        if proof is not None:
-            proved, reason = _proved_force_errors(self, pair, e)
-            if np.isfinite(proved).all():
-                forces = [x.with_proof(bar) for x, bar in zip(forces, proved.tolist(), strict=True)]
-        if of_shape > VALUE_ROUND_OFF * largest:
-            forces = [replace(x, error=x.error + of_shape, kind="estimated") for x in forces]
-        rows = [
-            *forces,
-            *_means(state, boundary, sum_error + of_shape),
-            peak_of(self, state, star, corners),
-            *ends_of(state),
-            _approach(self, state, e, forces[0].error if along == "itself" else 0.0),
-            _energy(self, proof is not None),
-            largest_von_mises(self, equilibrated, corners),
-        ]
-        size, notes = float(np.abs(boundary.curve).max()), [reason]
-        if along != "itself":
-            notes.insert(
-                0, f"force along {along}, ({', '.join(f'{x:.4g}' for x in e.round(12) + 0.0)})"
-            )
+        rows, note = list[Quantity](), ""
+        if state is not None:
+            rows, note, reason = _of_pair(self, state, pair, corners)
+        equilibrated = None if proof is None else proof.values
+        rows += [_energy(self, proof is not None), largest_von_mises(self, equilibrated, corners)]
+        size, notes = float(np.abs(boundary.curve).max()), [note, reason]
         if proof is not None and proof.proof.dual.cells.curved.any():
             degree = boundary.geometry_order
             notes.append(f"guaranteed on the domain of the mesh, of curves of degree {degree}")
@@ -173,6 +146,41 @@ class Measured(Guaranteed):
                 off_axis = np.abs(row.place) >= AXIS_COORDINATE * size
                 rows[k] = replace(row, place=np.where(off_axis, row.place, 0.0))
         return Quantities(tuple(rows), "; ".join(text for text in notes if text))
+
+
+def _of_pair(
+    solution: Measured, state: ContactState, pair: int, corners: Singular
+) -> tuple[list[Quantity], str, str]:
+    """Rows of a pair's force, pressures, ends and approach, a note, and why none is proved."""
+    boundary, (proof, reason) = solution.discrete.space.trace, solution._proved
+    star = None
+    if proof is not None:
+        star = proof.pressure[pair].values(*boundary.at_nodes(state.line.segments))
+    e, along = direction_of(solution, pair)
+    e = e + 0.0  # no -0
+    largest = max(abs(float(one.force.sum())) for one in solution.pairs)
+    factor = FORCE_FACTORS[min(solution.order, max(FORCE_FACTORS))]
+    of_order = factor * solution.relative_error_estimate**2 * largest
+    sum_error = of_order + held_point_force(state, boundary)
+    of_shape = float(np.linalg.norm(load_by_shape(solution.problem, solution.mesh)))
+    force = solution.contact_force(pair)
+    parts = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}
+    forces = [Quantity(k, float(value), sum_error, "estimated") for k, value in parts.items()]
+    if proof is not None:
+        proved, reason = _proved_force_errors(solution, pair, e)
+        if np.isfinite(proved).all():
+            forces = [x.with_proof(bar) for x, bar in zip(forces, proved.tolist(), strict=True)]
+    if of_shape > VALUE_ROUND_OFF * largest:
+        forces = [replace(x, error=x.error + of_shape, kind="estimated") for x in forces]
+    rows = [
+        *forces,
+        *_means(state, boundary, sum_error + of_shape),
+        peak_of(solution, state, star, corners),
+        *ends_of(state),
+        _approach(solution, state, e, forces[0].error if along == "itself" else 0.0),
+    ]
+    words = ", ".join(f"{x:.4g}" for x in e.round(12) + 0.0)
+    return rows, "" if along == "itself" else f"force along {along}, ({words})", reason
 
 
 def _means(state: ContactState, boundary: BoundaryTrace, error: float) -> list[Quantity]:
@@ -311,9 +319,16 @@ def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
     return (*solution.earlier, now)[-EARLIER_LEVELS:]
 
 
-def quantities_of_solids(solution: Estimated, pair: int) -> Quantities:
-    """Values of a pair, on levels of `adapt` with the larger of the last two level differences."""
-    values, place = figures(solution, solution.pairs[pair])
+def quantities_of_solids(solution: Estimated, state: ContactState | None, pair: int) -> Quantities:
+    """Values of a pair, on levels of `adapt` with the larger of the last two level differences.
+
+    Without any pair the energy.
+    """
+    if state is None:
+        return Quantities(
+            (unknown("energy", solution.energy),), "without an error, as without pairs"
+        )
+    values, place = figures(solution, state)
     levels = np.array([*(before[pair] for before in solution.earlier), values])
     known = len(levels) > EARLIER_LEVELS
     errors = np.abs(np.diff(levels, axis=0)).max(axis=0) if known else np.full(len(NAMES), np.nan)
