@@ -16,7 +16,6 @@ from ..threads import one_thread
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
 MULTIPLIED_ENTRIES = 60_000  # of a matrix, up to which T'AT costs no more than the change to it
-COUPLED_ENTRIES = 150_000  # ... where that has entries of its own, as between two bodies
 MAX_CHANGE = 0.4  # entries that contact rows change, relative to those of the matrix
 
 
@@ -84,33 +83,21 @@ def congruent(
     """
     # element="physical" has fewer node values than edge unknowns
     if A.nnz <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
-        return _product(matrix, T)
+        right = handed_over(T)
+        product = right.CreateTranspose() @ (matrix @ right)
+        return shared(product), product
     change = change_of_basis(A, T)
     if change.nnz > MAX_CHANGE * A.nnz:
         return A + change, None
-    places = _places(A, change)
-    if places is None and A.nnz <= COUPLED_ENTRIES:
-        return _product(matrix, T)
-    total = _changed(matrix, A, change, places)
+    total = _changed(matrix, A, change)
     return shared(total), total
 
 
-def _product(matrix: ng.BaseMatrix, T: sp.csr_array) -> tuple[sp.csr_array, ng.BaseMatrix]:
-    """The product T'AT (k, k) of `matrix` A, for SciPy and for NGSolve."""
-    right = handed_over(T)
-    product = right.CreateTranspose() @ (matrix @ right)
-    return shared(product), product
-
-
-def _changed(
-    matrix: ng.BaseMatrix, A: sp.csr_array, change: sp.csr_array, places: Index | None
-) -> ng.BaseMatrix:
-    """The sum of `matrix`, (n, n), which is `A` for SciPy, and a `change` (n, n), for NGSolve.
-
-    The `places` are those of `_places`.
-    """
+def _changed(matrix: ng.BaseMatrix, A: sp.csr_array, change: sp.csr_array) -> ng.BaseMatrix:
+    """The sum of `matrix`, (n, n), which is `A` for SciPy, and a `change` (n, n), for NGSolve."""
     if change.nnz == 0:
         return matrix
+    places = _places(A, change)
     if places is None:
         return (matrix + handed_over(change)).CreateSparseMatrix()
     total = matrix.CreateMatrix()
@@ -200,8 +187,7 @@ def cholesky_of_closed_rows(
         S = sp.eye_array(len(free), format="csr") + sp.diags_array(free.astype(float)) @ links
         part = T @ S
         part.eliminate_zeros()  # what cancels
-        change = change_of_basis(A, basis @ part)
-        solve = cholesky(_changed(matrix, A, change, _places(A, change)))(free)
+        solve = cholesky(_changed(matrix, A, change_of_basis(A, basis @ part)))(free)
         return lambda b: np.asarray(S @ solve(S.T @ b))
 
     return factor
