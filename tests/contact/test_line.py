@@ -1,4 +1,4 @@
-"""Contact points: corners, weights, gaps, partners, and which points carry a row."""
+"""Contact points: corners, and which points carry a row."""
 
 import math
 
@@ -10,7 +10,7 @@ from drivers.reference.cases import LINE
 from ngcontact import Contact
 from ngcontact.contact.dual import contact_line
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc, disc_on_block
+from ngcontact.geometries import blocks
 
 ORDERS = [1, 2, 3, 4]
 SIDES = np.diff(np.array(LINE), axis=0)
@@ -18,9 +18,9 @@ LENGTHS = np.linalg.norm(SIDES, axis=1)
 DOWNWARD = np.column_stack([SIDES[:, 1], -SIDES[:, 0]]) / LENGTHS[:, None]
 
 
-def trace_of(geometry, order, maxh=0.5, curve=None):
-    mesh = geometry if isinstance(geometry, ng.Mesh) else ng.Mesh(geometry.GenerateMesh(maxh=maxh))
-    mesh.Curve(order if curve is None else curve)
+def trace_of(geometry, order):
+    mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.5))
+    mesh.Curve(order)
     return boundary_trace(mesh, order)
 
 
@@ -40,8 +40,8 @@ def points_are_consistent(line, trace):
     assert (line.faces == here.all(axis=1)).all()
 
 
-def polygonal(order, direction=None, **options):
-    trace = trace_of(blocks(line=LINE), order, **options)
+def polygonal(order, direction=None):
+    trace = trace_of(blocks(line=LINE), order)
     return trace, contact_line(trace, Contact("upper_contact", "lower_contact", direction))
 
 
@@ -84,30 +84,6 @@ def test_steep_sides_do_not_face_a_fixed_direction():
     assert not line.faces[inner].any()
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_disc_on_block_measures_the_curves_of_the_mesh(order):
-    trace = trace_of(disc_on_block(), order, maxh=0.3)
-    line = contact_line(trace, Contact("disc_arc", "block_top", direction=(0, -1), rows="nodal"))
-    points_are_consistent(line, trace)
-    assert line.searches == 1
-    np.testing.assert_allclose(line.gap, line.position[:, 1], atol=1e-15)
-    # The vertices lie on the circle, the points between them on the mesh's curve.
-    vertex = np.isin(line.node, trace.nodes[:, [0, -1]])
-    x = line.position[vertex, 0]
-    circle = x**2 / (1 + np.sqrt(np.maximum(1 - x**2, 0)))
-    np.testing.assert_allclose(line.gap[vertex], circle, atol=1e-14)
-    # The whole quarter circle faces, save its end with a horizontal normal.
-    [end] = np.flatnonzero(~line.faces)
-    assert np.count_nonzero(line.rows[end] < 0) == 1
-    assert line.rows[line.rows < 0].size == 1
-    x = line.position[line.rows[line.faces], 0]
-    assert line.shares[line.faces].sum() == pytest.approx(np.ptp(x), rel=1e-14)
-    # The partners are straight below.
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-14)
-    np.testing.assert_allclose(partner[:, 1], 0, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     "contact",
     [
@@ -122,16 +98,3 @@ def test_pairs_that_do_not_face_are_refused(contact):
     trace = trace_of(blocks(), 1)
     with pytest.raises(ValueError, match=r"no point of the secondary .* faces the primary"):
         contact_line(trace, contact)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("direction", [None, (0, -1)])
-def test_gap_given_as_a_function_of_place(order, direction):
-    trace = trace_of(disc(symmetric=False), order, maxh=0.4)
-    for gap in (ng.x**2 / 2 + ng.y, lambda x, y: x**2 / 2 + y):
-        line = contact_line(trace, Contact("arc", direction=direction, gap=gap))
-        points_are_consistent(line, trace)
-        x, y = line.position.T
-        np.testing.assert_allclose(line.gap, x**2 / 2 + y, atol=1e-14)
-        assert line.searches == 0
-        assert (line.partner == -1).all()
