@@ -116,7 +116,8 @@ def _error_of_end(pair: ContactState, number: int) -> float:
     Near the end gap^(2/3) outside and p^2 inside are smooth in the length along the line. Where the
     line through the first two of either vanishes elsewhere, the discrete end is as uncertain; where
     there are no two, or beyond the zone, the zone is. Where contact only opens for a way, as beside
-    a corner that is closed, it is no more than that way.
+    a corner that is closed, it is no more than that way, which hardly any points resolve: there all
+    of the step counts.
     """
     x, ends = pair.line.position, pair.transitions
     closed, opened = ends.closed[number], ends.opened[number]
@@ -127,14 +128,14 @@ def _error_of_end(pair: ContactState, number: int) -> float:
     inside = distances_along(x[closed]) + ends.beyond[number]
     outside = step + distances_along(x[opened]) - ends.beyond[number]
     gap, squares = np.maximum(pair.gap[opened], 0.0) ** (2 / 3), pair.pressure[closed] ** 2
-    zone, found = max(float(inside[-1]), step), []
+    zone, way, found = max(float(inside[-1]), step), 0.0, []
     if any(other[0] == opened[-1] for k, other in enumerate(ends.opened) if k != number):
-        zone = min(zone, step + float(distances_along(x[opened])[-1]))
+        way = zone = min(zone, step + float(distances_along(x[opened])[-1]))
     for t, y in ((outside, gap), (inside, squares)):
         line = len(t) > 1 and y[0] != y[1]
         zero = abs(t[0] - y[0] * (t[1] - t[0]) / (y[1] - y[0])) if line else zone
         found.append(min(float(zero), zone))
-    return max(found) + END_STEP_SHARE * step
+    return max(max(found) + END_STEP_SHARE * step, min(max(found) + step, way))
 
 
 def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float, float]:
