@@ -4,7 +4,7 @@ from .iterative import IterativeSystems as IterativeSystems
 from .iterative import Limits as Limits
 from .multigrid import Multigrid as Multigrid
 from .multigrid import truncated_multigrid as truncated_multigrid
-from .sparse import change_of_basis as change_of_basis
+from .sparse import assembled as assembled
 from .sparse import cholesky as cholesky
 from .sparse import cholesky_of_closed_rows as cholesky_of_closed_rows
 from .sparse import congruent as congruent

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import ngsolve as ng
@@ -59,9 +60,26 @@ def _rows(K: sp.csr_array) -> Index:
     return np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
 
 
+def assembled(blocks: Sequence[tuple[Index, Array]], n: int) -> ng.BaseMatrix:
+    """NGSolve's matrix (n, n), a sum: `blocks` (b, k) and (b, k, k) are unknowns and values."""
+    size, end = sum(values.size for _, values in blocks), 0
+    row, column, entries = Array_I_S(size), Array_I_S(size), Array_D_S(size)
+    for at, values in blocks:
+        start, end, k = end, end + values.size, at.shape[1]
+        row.NumPy()[start:end] = np.repeat(at, k)
+        column.NumPy()[start:end] = np.tile(at, k).ravel()
+        entries.NumPy()[start:end] = values.ravel()
+    return ng.la.SparseMatrixd.CreateFromCOO(row, column, entries, n, n)
+
+
 def handed_over(K: sp.sparray) -> ng.BaseMatrix:
-    """A copy for NGSolve of the SciPy matrix `K` (m, n)."""
+    """The SciPy matrix `K` (m, n) for NGSolve: the one whose memory it is in, else a copy."""
     K = K.tocsr()
+    memory = K.data
+    while isinstance(memory, np.ndarray):
+        memory = memory.base
+    if isinstance(memory, _View):
+        return memory.owner
     return _from_entries(_rows(K), K.indices, K.data, K.shape)
 
 

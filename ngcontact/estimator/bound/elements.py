@@ -39,6 +39,14 @@ def traces(degree: int, t: Array) -> Array:
     return np.asarray(values * np.sqrt(2 * np.arange(degree + 1) + 1))
 
 
+def across(normal: Array, components: int) -> Array:
+    """Matrices (..., 2, v) that make s n of the v `components` of s; `normal` (..., 2) is n."""
+    found = np.zeros((*normal.shape, components))
+    found[..., 0, 0] = found[..., 1, -1] = normal[..., 0]
+    found[..., 1, 1] = found[..., 0, -1] = normal[..., 1]
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Element:
     """Condensed triangles of one kind: b triangles, v Voigt components, d multipliers on each."""
@@ -98,9 +106,9 @@ class Element:
         `c` (n, m) are the coefficients in all; the hoop's part of radial forces is left out.
         """
         corners = self.corners[some]
-        T = stresses(self.degree, corners, coordinates(corners, x), self.axial, self.on_axis)
+        A, P = stresses(self.degree, corners, coordinates(corners, x), self.axial, self.on_axis)
         c = (self.combined @ c[..., None])[some]
-        s = (T.reshape(len(c), -1, T.shape[-1]) @ c).reshape(T.shape[:-1])
+        s = (A @ (P.reshape(len(c), -1, P.shape[-1]) @ c).reshape(*P.shape[:-1], 1))[..., 0]
         if self.force.any():
             s = s + balancing(self.force_degree, corners, x, self.force[some], self.axial)
         return np.asarray(s)
@@ -125,7 +133,7 @@ class Stress:
     def tractions(self, at: Index, x: Array, normal: Array) -> Array:
         """Tractions s n (k, q, 2) at `x` (k, q, 2) of `at` (k,), with unit `normal` (k, q, 2)."""
         s = self.values(at, x)
-        return np.asarray(s[..., [0, -1]] * normal[..., :1] + s[..., [-1, 1]] * normal[..., 1:])
+        return np.asarray((across(normal, s.shape[2]) @ s[..., None])[..., 0])
 
     def traction_moments(self) -> tuple[Array, float]:
         """Moments (d,) of the tractions over all triangles, and the largest of one triangle."""
@@ -334,10 +342,12 @@ def _element(
             force[..., 0] = 0.0
             hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
 
-    def columns(x: Array, local: Array) -> tuple[Array, Array]:
-        """T (b, q, v, n) and s_p (b, q, v) at `x` (b, q, 2), by (a, b) `local` (b, q, 2)."""
-        T = stresses(degree, corners, local, axial, on_axis)
-        return T, balancing(n, corners, x, force, axial) if force.any() else 0 * T[..., 0]
+    def columns(x: Array, local: Array) -> tuple[tuple[Array, Array], Array]:
+        """T as of `stresses` and s_p (b, q, v) at `x` (b, q, 2), by (a, b) `local` (b, q, 2)."""
+        s_p = np.zeros((*x.shape[:2], 3 + axial))
+        if force.any():
+            s_p = balancing(n, corners, x, force, axial)
+        return stresses(degree, corners, local, axial, on_axis), s_p
 
     T, s_p = columns(points.x, local)
     if axial:
@@ -370,18 +380,19 @@ def _element(
     )
 
 
-def _weighted(T: Array, weight: Array, compliance: Array, strain: Array) -> tuple[Array, Array]:
-    """Stresses T (b, q, v, n) as rows (b, q v, n) whose products are those of the norm of C^-1.
+def _weighted(
+    T: tuple[Array, Array], weight: Array, compliance: Array, strain: Array
+) -> tuple[Array, Array]:
+    """Stresses T, as of `stresses`, as rows (b, q v, n) whose products are those of C^-1's norm.
 
     And a `strain` (b, q, v) as one (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
     (b, q, v, v) or (b, 1, v, v).
     """
-    L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None]
-    strain = (np.linalg.inv(L) @ (root * strain)[..., None]).reshape(len(T), 1, -1)
-    rows = np.zeros_like(T)
-    for i, j in zip(*np.nonzero(np.abs(L).max(axis=(0, 1))), strict=True):
-        rows[:, :, j] += root * L[..., i, j, None] * T[:, :, i]
-    return rows.reshape(len(T), -1, T.shape[-1]), strain
+    (A, P), root = T, np.sqrt(weight)[..., None, None]
+    L = np.linalg.cholesky(compliance)
+    strain = (np.linalg.inv(L) @ (root * strain[..., None])).reshape(len(weight), 1, -1)
+    rows = (root * (L.swapaxes(2, 3) @ A)) @ P
+    return rows.reshape(len(weight), -1, P.shape[-1]), strain
 
 
 def _nearest(rows: Array, rest: Array) -> tuple[Array, Array]:
@@ -397,7 +408,7 @@ def _moments(
     cells: Cells,
     mu: Multipliers,
     at: Index,
-    columns: Callable[[Array, Array], tuple[Array, Array]],
+    columns: Callable[[Array, Array], tuple[tuple[Array, Array], Array]],
 ) -> tuple[Array, Array, Index]:
     """Moments of tractions with the multipliers of triangles `at` (b,), and their numbers (b, d).
 
@@ -415,12 +426,11 @@ def _moments(
         own = np.where(back[:, None], 1 - t, t)
         x, dx = cells.around(at, i, t)
         local = CORNERS[i - 2] + t[:, None] * (CORNERS[i - 1] - CORNERS[i - 2])
-        T, s_p = columns(x, coordinates(corners, x) if bent else local)
-        T = np.concatenate([T, s_p[..., None]], axis=3)
-        n = dx @ CLOCKWISE  # times ds / dt
-        chi = (w * cells.measure(x))[..., None] * traces(k, own)
-        for p, q in ((0, -1), (-1, 1)):
-            traction = T[:, :, p] * n[..., :1] + T[:, :, q] * n[..., 1:]
-            found.append(traction.transpose(0, 2, 1) @ chi)
+        (A, P), s_p = columns(x, coordinates(corners, x) if bent else local)
+        to_traction = across(dx @ CLOCKWISE, s_p.shape[2])  # times ds / dt
+        chi = ((w * cells.measure(x))[..., None] * traces(k, own))[:, None]
+        parts = ((to_traction @ A) @ P, to_traction @ s_p[..., None])
+        traction = np.concatenate(parts, axis=3).transpose(0, 2, 3, 1)
+        found += [*(traction @ chi).swapaxes(0, 1)]
     N = np.concatenate(found, axis=2) * there[:, None]
     return N[:, :-1], N[:, -1], dofs

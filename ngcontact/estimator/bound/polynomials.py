@@ -77,13 +77,13 @@ def scales(corners: Array) -> tuple[Array, Array]:
 
 def stresses(
     degree: int, corners: Array, local: Array, axial: bool, on_axis: bool = False
-) -> Array:
-    """Basis (b, q, c, m) of the stresses of a degree.
+) -> tuple[Array, Array]:
+    """Basis of the stresses of a degree: A (b, 1, c, k) times P (b, q, k, m) or (q, k, m).
 
     Their c components are xx, yy, xy or rr, zz, hoop, rz; coefficients have units of stress. About
     an axis (`axial`) the degree is that of T, and it vanishes `on_axis` if a side lies there.
     Points of triangles `corners` (b, 3, 2) are given by (a, b), `local` (b, q, 2), or (q, 2) where
-    these are the same for all.
+    these are the same for all; in the plane P is, too: second derivatives of Airy's function.
     """
     _, size = scales(corners)
     E = edges(corners) / (2 * size)
@@ -92,8 +92,7 @@ def stresses(
         rows = [px * px, -2 * px * qx, qx * qx], [py * py, -2 * py * qy, qy * qy]
         airy = np.array([*rows, [px * py, -(px * qy + py * qx), qx * qy]]).transpose(2, 0, 1)
         airy /= np.linalg.det(E)[:, None, None] ** 2
-        psi = derivatives(degree + 2, local, DERIVATIVES[:2:-1], 2)
-        return np.asarray(airy[:, None] @ psi)
+        return airy[:, None], derivatives(degree + 2, local, DERIVATIVES[:2:-1], 2)
     (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)[..., None, None]
     r = (corners[:, 1:2, 0] + (local @ edges(corners)[:, 0, :, None])[..., 0]) / size[:, 0]
     k, r = int(on_axis), r[..., None]  # T_rr = r^k f, chi = r^(2 k) g
@@ -108,7 +107,7 @@ def stresses(
         found[:, :, 1, n:] -= 2 * g
     found[:, :, 2, n:] = r ** (2 * k) * (a_z**2 * g_aa + 2 * a_z * b_z * g_ab + b_z**2 * g_bb)
     found[:, :, 3, n:] = r ** (2 * k - 1) * (a_z * g_a + b_z * g_b)
-    return found
+    return np.eye(4)[None, None], found
 
 
 def scalars(degree: int, corners: Array, x: Array) -> Array:

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 
 from ...arrays import Array, Index, Mask, from_triplets
 from ...errors import ContactError
-from ...linalg import change_of_basis, cholesky, lower_half, shared
+from ...linalg import assembled, cholesky, congruent, handed_over, shared
 from ...qp import (
     BorderedSystems,
     QuadraticProgram,
@@ -67,11 +67,8 @@ class DualProgram:
 
     @cached_property
     def systems(self) -> BorderedSystems:
-        """Its linear systems; what is factorised is the matrix made definite."""
-        matrix = lower_half(self.program.K)
-        lower = shared(matrix)
-        lower.data[lower.indptr[1:] - 1] *= 1 + DIAGONAL_SHIFT  # the last entry of each row
-        return BorderedSystems(self.program, cholesky(matrix))
+        """Its linear systems, factorised when the first is solved."""
+        return BorderedSystems(self.program, cholesky(handed_over(self.program.K)))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factor, which is made again."""
@@ -181,12 +178,10 @@ def dual_program(
     firsts = [mu.start[line.side, None] + np.arange(line.psi.shape[1]) for line in lines]
     unknown, null_space = _joined(firsts, np.intp), no_null_space(d)
     R, T = _basis(mu, lines, unknown)
-    m, dofs = len(unknown), [e.dofs.astype(np.int32) for e in elements]  # half of the memory
-    squares = [e.N.transpose(0, 2, 1) @ e.N for e in elements]
-    K = _summed([(at, at, x) for at, x in zip(dofs, squares, strict=True)], (d, d))
-    if m:
-        K = K + change_of_basis(K, T)
+    matrix = assembled([(e.dofs, e.N.transpose(0, 2, 1) @ e.N) for e in elements], d)
+    K = congruent(matrix, shared(matrix), T)[0] if len(unknown) else shared(matrix)
     size = K.diagonal()
+    K.setdiag((1 + DIAGONAL_SHIFT) * size)
     idle = fixed | (size <= AXIS_STIFFNESS * size.max())  # on the axis there is no traction
     if motions.shape[1]:
         y = splu(T.tocsc()).solve(motions)
