@@ -33,6 +33,23 @@ def test_a_force_at_a_clamped_end_counts_in_the_bar(order, h):
     assert q["force, y"].error <= 1.6 * abs(q["force, y"].value - 2 / 3)
 
 
+def test_radial_contact_about_an_axis_has_no_resultant():
+    """Neither radially, by symmetry, nor along the axis, which no direction of contact has."""
+    tubes = {"shaft": (1, 2), "hub": (2, 3)}
+    bodies = (rectangle(k, r, (0, 1), (k, f"{k}_outer", k, f"{k}_inner")) for k, r in tubes.items())
+    problem = Problem(
+        geometry=compound(*bodies),
+        materials={"shaft|hub": Elastic(E=100.0, nu=0.3)},
+        displacement={"shaft|hub": (None, 0)},
+        contact=[Contact("shaft_outer", "hub_inner", direction=(1, 0), gap=-0.01)],
+        model="axisymmetric",
+    )
+    q = solve(problem, maxh=0.5, order=2).quantities()
+    assert q["mean pressure"].value > 0.1
+    for name in ("force", "force, x", "force, y"):
+        assert q[name].value == q[name].error == 0
+
+
 @pytest.mark.parametrize("order", [2, 3, 4])
 @pytest.mark.study(witness=["2"])
 def test_largest_stress_lies_on_the_bore_of_a_press_fit(order):

@@ -33,7 +33,7 @@ from ...contact import ContactState, signed_distance, state_of
 from ...contact import area_in_contact as area_on_surface
 from ...discrete import load_by_shape
 from ...errors import ContactError, warn
-from ...fem import BoundaryTrace, FacetTrace, load_vector, stress_of
+from ...fem import BoundaryTrace, FacetTrace, load_vector, model_of, stress_of
 from ...quadrature import has_rough_loads
 from ...solved import Solved
 from ..bound import WORK_BONUS, EquilibratedStress, Guaranteed, force_bar
@@ -165,7 +165,12 @@ def _of_pair(
     of_shape = float(np.linalg.norm(load_by_shape(solution.problem, solution.mesh)))
     force = solution.contact_force(pair)
     parts = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}
-    forces = [Quantity(k, float(value), sum_error, "estimated") for k, value in parts.items()]
+    # Along directions that its points do not have, and radially about an axis, a force is 0.
+    d = state.line.direction
+    sizes = model_of(solution.problem).resultant(np.abs(d).max(axis=0, initial=0.0))
+    errors = sum_error * np.append(np.abs(d @ e).max(initial=0.0), sizes)
+    each = zip(parts.items(), errors.tolist(), strict=True)
+    forces = [Quantity(name, float(value), bar, "estimated") for (name, value), bar in each]
     if proof is not None:
         proved, reason = _proved_force_errors(solution, pair, e)
         if np.isfinite(proved).all():
