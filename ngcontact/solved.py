@@ -25,7 +25,6 @@ from .fem import (
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 
-PLANE_MODELS = ("plane strain", "plane stress")
 STRESS_FREE = 1e-12  # norm of a stress, relative to the terms that cancel in it: round-off
 
 
@@ -243,11 +242,12 @@ def made_of(
 def expected_pairs(solution: Solved) -> list[ContactState]:
     """The pairs of a solution as a finer mesh should find them, see `ContactState.expected`."""
     problem, trace, found = solution.problem, solution.discrete.space.trace, list[ContactState]()
-    if problem.model not in PLANE_MODELS:
+    if problem.dim == 3:
         return solution.pairs
     for state in solution.pairs:
         sides = trace.element[state.line.segments], trace.element[state.line.facing]
-        found.append(state.expected(contact_modulus(problem, solution.mesh, *sides)))
+        modulus = contact_modulus(problem, solution.mesh, *sides)
+        found.append(state.expected(modulus, trace.model))
     return found
 
 

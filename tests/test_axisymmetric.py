@@ -68,7 +68,7 @@ def test_a_ball_on_a_conical_seat(order):
         contact=[Contact("arc", "seat", direction=(q, -q))],
         model="axisymmetric",
     )
-    *_, solution = adapt(problem, order=order, max_dofs=4000)
+    *_, solution = adapt(problem, order=order, max_dofs=6000)
     weight = load * math.pi
     assert solution.contact_force()[1] == pytest.approx(weight, rel=ROUND_OFF)
     low, high = np.sort(solution.transitions()[:, 0])

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask, distances_along
-from ..fem import ORDERS
+from ..fem import ORDERS, Model
 from .line import ContactLine, by_line, in_contact, links, twins
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
@@ -182,13 +182,14 @@ class ContactState:
         """Transitions from binding to non-binding contact."""
         return self.ends or transitions_on(self.line, self.gap, self.active)
 
-    def expected(self, modulus: float) -> ContactState:
+    def expected(self, modulus: float, model: Model) -> ContactState:
         """The state that a finer mesh should find: contact ends where its forces tell.
 
         These are right long before points resolve a zone. Under a force F per length, with a gap of
         curvature k between bodies of the `modulus` E*, it has Hertz's half-width a, the root of
-        4 F / (pi E* k). That is taken where it ends in the same segment as by the gap, and the
-        segment is long. A zone with one end on its line is half of one.
+        4 F / (pi E* k), around an axis the cube root of 3 F / (4 E* k). That is taken where it ends
+        in the same segment as by the gap, and the segment is long. A zone with one end on its line
+        is half of one.
         """
         ends, active, x = self.transitions, self.active.copy(), self.line.position
         inner, outer, position = ends.inner.copy(), ends.outer.copy(), ends.position.copy()
@@ -198,14 +199,20 @@ class ContactState:
             force = self.force[closed].sum()
             if len(path) < 3 or force <= 0 or ends.beyond[k] == 0:  # at a corner, or a vertex
                 continue
-            middle = self.force[closed] @ x[closed] / force
+            middle, part = self.force[closed] @ x[closed] / force, 1
             if np.isin(ends.inner, closed).sum() == 1:
-                middle, force = x[closed[-1]], 2 * force
+                middle, part = x[closed[-1]], 2
             s = (x[path] - middle) @ (x[path[-1]] - middle)
             s /= np.sqrt(s[-1])
             powers = np.vander(s / s[-1], 3)
             curvature = 2 * np.linalg.lstsq(powers, self.line.gap[path])[0][0] / s[-1] ** 2
-            a = np.sqrt(4 * force / (np.pi * modulus * curvature)) if curvature > 0 else np.inf
+            if curvature <= 0:
+                continue
+            if self.line.on_axis[closed].any():
+                a = np.cbrt(0.75 * force / (modulus * curvature))
+            else:
+                per_length = part * force / model.measure(middle[None])[0]
+                a = np.sqrt(4 * per_length / (np.pi * modulus * curvature))
             long = s[-1] - s[first - 1] > LONG_SEGMENT * a
             if long and s[max(first - 1 - order, 0)] <= a < s[-1]:
                 active[path[s > 0]] = s[s > 0] <= a

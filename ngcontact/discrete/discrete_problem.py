@@ -478,11 +478,11 @@ def _carried(new: ContactLine, old: ContactState) -> Mask:
     # A new point in the middle of two: active if one of them is, whatever round-off says.
     tied = distance[:, 1] <= (1 + DISTANCE_ROUND_OFF) * away
     active: Mask = old.active[nearest] | (tied & old.active[near[:, 1]])
-    order = known.rows.shape[1] - 1
-    if order > 1 and known.dim == 2 and away.max() > size:  # not the same points
-        ends = old.transitions
-        for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
-            around = (nearest == inner) | (nearest == outer)
-            inwards = known.position[inner] - known.position[outer]
-            active[around] = (new.position[around] - place) @ inwards >= 0
+    order, ends = known.rows.shape[1] - 1, old.transitions if known.dim == 2 else None
+    if order > 1 and ends is not None and len(ends.inner) and away.max() > size:  # other points
+        around = np.isin(nearest, [ends.inner, ends.outer])
+        end = cKDTree(ends.position).query(new.position)[1]  # the nearest one tells
+        inwards = (known.position[ends.inner] - known.position[ends.outer])[end]
+        inside = ((new.position - ends.position[end]) * inwards).sum(axis=1) >= 0
+        active[around] = inside[around]
     return active

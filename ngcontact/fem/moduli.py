@@ -117,7 +117,7 @@ def contact_modulus(problem: Problem, mesh: ng.Mesh, *sides: Index) -> float:
     for side in sides:
         if len(side):
             mu, kappa = moduli.shear[side].mean(), moduli.bulk[side].mean()
-            kappa -= mu / 3 if mesh.dim == 2 else 0.0  # that of space
+            kappa -= mu / 3 if problem.model.startswith("plane") else 0.0  # that of space
             compliance += (3 * kappa + 4 * mu) / (4 * mu * (3 * kappa + mu))
     return 1 / compliance
 

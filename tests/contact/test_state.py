@@ -16,6 +16,7 @@ from ngcontact.contact.state import (
     pressure_across_corners,
     transitions_on,
 )
+from ngcontact.fem import MODELS
 
 
 def line(x, order=1, y=None):
@@ -55,26 +56,29 @@ def test_two_zones_have_four_ends():
     assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
 
 
-@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("zone", ["whole", "half", "on an axis"])
 @pytest.mark.parametrize("order", [1, 2, 4])
-def test_the_end_of_an_unresolved_zone_is_told_by_its_force(order, half):
+def test_the_end_of_an_unresolved_zone_is_told_by_its_force(order, zone):
     """Hertz's half-width, but not of a flat gap, nor in another segment, nor in a short one."""
-    x = np.arange(0 if half else -6 * order, 6 * order + 1) / order
+    x = np.arange(-6 * order if zone == "whole" else 0, 6 * order + 1) / order
     curved, flat = (line(x, order) for _ in range(2))
     curved.gap, flat.gap = x**2 / 10, 0 * x
+    curved.on_axis = flat.on_axis = (x == 0) & (zone == "on an axis")
+    model = MODELS["axisymmetric" if zone == "on an axis" else "plane strain"]
 
     def expected(points, closed, a):
         """Ends, as they are and as expected, and points in contact; of half-width `a` by force."""
         active = np.abs(x) < closed
-        force = active * np.pi * a**2 / 20 / active.sum() / (2 if half else 1)
+        whole = 4 * a**3 / 15 if zone == "on an axis" else np.pi * a**2 / 20
+        force = active * (whole / active.sum() / (2 if zone == "half" else 1))
         state = ContactState(points, np.where(active, 0.0, 0.1 + np.abs(x) ** 1.5), force, active)
-        found = state.expected(1.0)
+        found = state.expected(1.0, model)
         ends = (one.transitions.position[:, 0] for one in (state, found))
         return *ends, found.active
 
     _, ends, active = expected(curved, 0.1 / order, 0.4)
     assert np.abs(ends) == pytest.approx(0.4, rel=1e-12)  # the line is straight
-    assert len(ends) == (1 if half else 2)
+    assert len(ends) == (2 if zone == "whole" else 1)
     assert np.array_equal(active, np.abs(x) <= 0.4)
     for asked in ((flat, 0.1 / order, 0.4), (curved, 0.1 / order, 4.0), (curved, 5.1, 5.5)):
         known, ends, active = expected(*asked)

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic
-from ngcontact.fem.moduli import moduli_of, warn_of_locking
+from ngcontact.fem.moduli import contact_modulus, moduli_of, warn_of_locking
 from ngcontact.mesh import first_mesh
 
 BODIES = ("upper", "lower")
@@ -33,6 +33,14 @@ def test_bulk_modulus_of_an_isotropic_law(mesh, nu):
     assert found.bulk == pytest.approx(lam + mu, rel=tolerance)
     least = min(mu, lam + mu)  # eigenvalues of C on strains: 2 mu, 2 mu, 2 (lambda + mu)
     assert found.shear == pytest.approx(least, rel=tolerance)
+
+
+@pytest.mark.parametrize("model", ["plane strain", "plane stress", "axisymmetric"])
+def test_contact_modulus_of_two_equal_bodies_and_of_one(mesh, model):
+    problem, side, none = made_of(Elastic(2.5, 0.3), model), np.arange(3), np.arange(0)
+    modulus = 2.5 if model == "plane stress" else 2.5 / (1 - 0.3**2)
+    assert contact_modulus(problem, mesh, side, none) == pytest.approx(modulus, rel=1e-12)
+    assert contact_modulus(problem, mesh, side, side) == pytest.approx(modulus / 2, rel=1e-12)
 
 
 @pytest.mark.parametrize(
