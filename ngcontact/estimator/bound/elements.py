@@ -96,7 +96,7 @@ class Element:
         local = coordinates(self.corners, self.places.x)
         T = stresses(self.degree, self.corners, local, self.axial, self.on_axis)
         rows, rest = _weighted(T, self.places.weight, self.compliance, strain)
-        g, beyond = _nearest(rows @ self.combined, rest)
+        g, beyond = _nearest(rows, self.combined, rest)
         none = {name: np.zeros_like(getattr(self, name)) for name in ("force", "missed", "own")}
         return replace(self, strain=strain, g=g, beyond=beyond, **none)
 
@@ -355,7 +355,7 @@ def _element(
     rest = strain - (compliance @ s_p[..., None])[..., 0]
     rows, rest = _weighted(T, points.weight, compliance, rest)
     combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
-    g, beyond = _nearest(rows @ combined, rest)
+    g, beyond = _nearest(rows, combined, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
     N, own, dofs = _moments(cells, mu, at, columns)
@@ -395,12 +395,15 @@ def _weighted(
     return rows.reshape(len(weight), -1, P.shape[-1]), strain
 
 
-def _nearest(rows: Array, rest: Array) -> tuple[Array, Array]:
-    """`Element.g` and `.beyond` of orthonormal stresses `rows` (b, k, m) for strains (b, 1, k)."""
-    g = np.zeros((len(rows), 1, rows.shape[2]))
-    for _ in range(2):  # once more, as the rows are orthonormal but for round-off
-        more = rest @ rows
-        g, rest = g + more, rest - more @ rows.swapaxes(1, 2)
+def _nearest(rows: Array, combined: Array, rest: Array) -> tuple[Array, Array]:
+    """`Element.g` and `.beyond` for strains `rest` (b, 1, k).
+
+    The stresses `rows` (b, k, n), `combined` (b, n, m), are orthonormal.
+    """
+    g = np.zeros((len(rows), 1, combined.shape[2]))
+    for _ in range(2):  # once more, as they are orthonormal but for round-off
+        more = rest @ rows @ combined
+        g, rest = g + more, rest - more @ combined.swapaxes(1, 2) @ rows.swapaxes(1, 2)
     return g[:, 0], (rest**2).sum(axis=(1, 2))
 
 

@@ -377,7 +377,8 @@ def facing_sides(
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
         after, lift = _lifted_gap(vertices, gap, closed, total == 0, narrow, degree)
-    pressed = np.repeat((closed | (after.min(axis=1) <= 0))[:, None], of_pressure + 1, axis=1)
+    vanishes = np.median(after, axis=1) <= 0
+    pressed = np.repeat((closed | vanishes)[:, None], of_pressure + 1, axis=1)
     touched = np.isin(vertices, vertices[closed])
     pressed[:, [0, -1]] |= touched
     return FacingSides(

@@ -33,7 +33,7 @@ from .elements import Element, Multipliers, Stress, traces
 from .facing import POINTS, FacingSides
 
 FALLING_RATIO = 0.5  # ratio of two residuals from which more corrections take nothing off
-MOMENT_ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
+MOMENT_ROUND_OFF = 1e-14  # of tractions, relative to the largest: nothing to correct
 # Moment on a side that holds a motion which nothing resists, relative to the largest of tractions.
 # Balanced loads have one where quadrature misses a part: on meshes of curves, whose middle is not
 # that of the body, and of forces with kinks. Measured on S7: 1e-5 at maxh 0.45, 9e-7 at 0.27, 2e-7
