@@ -26,6 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from .arrays import Array, Columns, Index, Mask, dense, from_triplets, rows_of
 
 ROW_DIFFERENCE = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
+SOFT_CONDITION = 1e3  # condition number of rows up to which softer bodies in front host them
 RING_CONDITION = 1e6  # condition number from which rows that refer to each other are dependent
 MIN_PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if others have more
 MIN_SINE = 1e-6  # sine below which two conditions at one node are the same
@@ -321,17 +322,24 @@ def _check_prescribed(
             )
 
 
-def _without_links(C: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
+class _DependentRowsError(ValueError):
+    """Rows that contain the unknowns of each other, and cannot be told apart."""
+
+
+def _without_links(C: sp.csr_array, right: sp.csr_array, most: float) -> sp.csr_array:
     """Solution Y of (I + C) Y = `right`: rows that contain the unknowns of other rows.
 
-    Few do, where contact lines of several bodies share nodes.
+    Few do, where contact lines of several bodies share nodes. The condition number of those that
+    refer to each other is at `most` that.
     """
     linked, alone = np.flatnonzero(np.diff(C.indptr)), np.diff(C.indptr) == 0
     block = np.eye(linked.size) + C[linked][:, linked].toarray()
     _, group = connected_components(block, connection="strong")
     ring = np.flatnonzero(np.bincount(group)[group] > 1)
-    if ring.size and np.linalg.cond(block[np.ix_(ring, ring)]) > RING_CONDITION:
-        raise ValueError(f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}")
+    if ring.size and np.linalg.cond(block[np.ix_(ring, ring)]) > most:
+        raise _DependentRowsError(
+            f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}"
+        )
     known = sp.diags_array(alone.astype(float)) @ right
     place = sp.eye_array(C.shape[0], format="csr")[:, linked]
     return known + place @ sp.csr_array(np.linalg.inv(block)) @ (right - C @ known)[linked]
@@ -407,7 +415,13 @@ def change_of_basis(
     of_row[unknown[kept]] = True
     if of_row[column].any():  # unknowns of other rows
         right = from_triplets(value, row, column, (m, components.size))
-        Y = _without_links(right[:, unknown].tocsr(), right).tocoo()
+        most = RING_CONDITION if stiffness is None else SOFT_CONDITION
+        try:
+            Y = _without_links(right[:, unknown].tocsr(), right, most).tocoo()
+        except _DependentRowsError:
+            if stiffness is None:
+                raise
+            return change_of_basis(conditions, rows, length)  # the secondary hosts all
         row, column, value = Y.row, Y.col, Y.data
     column, unknown = components[column], components[unknown]
     node, i, j = blocks.nonzero()
