@@ -17,7 +17,6 @@ from ngcontact.geometries.region import body, polygon
 from ngcontact.lagrange import gauss, lagrange
 from ngcontact.linalg import coarsenings
 from ngcontact.mesh import curve, first_mesh, vertex_parents
-from ngcontact.problem import MeshArrays
 
 REPRODUCED = {  # cases whose solution lies in the space, at the orders of conftest.ORDERS
     "constant pressure": cases.pressure_patch,
@@ -84,11 +83,6 @@ def vertices(mesh, pattern):
     trace = boundary_trace(mesh, 1)
     numbers = np.unique(trace.nodes[trace.segments(pattern)])
     return coordinates(mesh)[numbers]
-
-
-def near_origin(mesh, radius=0.7):
-    """Elements with centres that near, (ne,)."""
-    return np.linalg.norm(MeshArrays(mesh).corners.mean(axis=1), axis=1) < radius
 
 
 def discrete(problem, order, rounds, maxh=0.5):

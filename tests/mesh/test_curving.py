@@ -10,15 +10,11 @@ from netgen.geom2d import SplineGeometry
 from netgen.occ import Axis, Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference import cases
-from ngcontact.adaptivity import refined
 from ngcontact.geometries import blocks, disc
 from ngcontact.mesh.cad import CadEdge, cad_edges
-from ngcontact.mesh.curving import copied, curve, vertex_parents
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh.curving import curve
 from ngcontact.problem import MeshArrays
 from tests.geometries.test_geometries import CASES
-from tests.scenes import coordinates, near_origin
 
 
 def mesh_of(geometry, maxh=0.5):
@@ -68,42 +64,6 @@ def test_a_refined_mesh_is_curved_again_also_without_cad():
     curved, _ = curve(mesh, 3, "isoparametric")
     assert curved.nedge == (3 * mesh.ne + mesh.GetNE(ng.BND)) / 2 < mesh.nedge  # Euler
     assert ng.Integrate(ng.CF(1), curved, order=6) == pytest.approx(math.pi, rel=1e-4)
-
-
-BLOCK = cases.partly_opening_block()  # straight, nodes matched
-
-
-def check_midpoints(mesh, old):
-    """Vertices after the first `old` ones lie in the middle of their parents."""
-    family, xy = vertex_parents(mesh), coordinates(mesh)
-    assert len(family) == mesh.nv
-    assert (family[:old] == -1).all()
-    new = np.arange(old, mesh.nv)
-    assert (family[new] >= 0).all()
-    assert (family[new] < new[:, None]).all()
-    # Round-off of coordinates of size 2.
-    np.testing.assert_allclose(xy[new], xy[family[new]].mean(axis=1), rtol=0, atol=1e-15)
-
-
-@pytest.mark.parametrize("local", [False, True])
-def test_vertices_lie_between_their_parents(local):
-    mesh = first = first_mesh(BLOCK, 0.5)
-    for _ in range(3):
-        mesh = refined(BLOCK, mesh, near_origin(mesh) if local else None)
-    check_midpoints(mesh, first.nv)
-    np.testing.assert_array_equal(vertex_parents(first), np.full((first.nv, 2), -1))
-
-
-def test_what_refinement_in_place_knows_is_kept():
-    mesh = ng.Mesh(first_mesh(BLOCK, 0.5).ngmesh.Copy())
-    old = mesh.nv
-    mesh.Refine()
-    mesh.Refine()
-    copy = copied(mesh)
-    check_midpoints(copy, old)
-    copy.Refine()
-    check_midpoints(copy, old)
-    check_midpoints(refined(BLOCK, copy), old)
 
 
 RNG = np.random.default_rng(3)
