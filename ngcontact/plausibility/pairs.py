@@ -304,7 +304,8 @@ def _left(solution: Solved, state: ContactState, seen: _Samples) -> tuple[_Sampl
     noise = LENGTH_ROUND_OFF * (np.abs(u).max() + np.abs(seen.x).max())
     if contact.primary is not None:
         u = u - trace.evaluate(solution.displacement, seen.facing, seen.s_facing)
-    return seen, seen.distance - (u * seen.direction).sum(axis=1), float(noise)
+    left = seen.distance - (u * seen.direction).sum(axis=1)  # (2.10)
+    return seen, left, float(noise)
 
 
 def _held_apart(solution: Solved, state: ContactState) -> str:

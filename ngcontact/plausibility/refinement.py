@@ -32,15 +32,11 @@ def at_round_off(
     terms = space.terms(displacement)
     if estimate > NOISE_LIMIT * terms:  # as nearly always
         return False
-    if estimate <= RIGID_ESTIMATE * terms and moves_rigidly(problem, space, displacement):
+    energy = energy_norm(problem, space, displacement)
+    if estimate <= RIGID_ESTIMATE * terms and energy <= EXACT_ESTIMATE * terms:
         return True  # nothing deforms, and the rest is the round-off of gaps
     ratio = float(moduli_of(problem, space.trace.mesh).ratio.max())
     return estimate <= max(EXACT_ESTIMATE, STRESS_NOISE * math.sqrt(ratio)) * terms
-
-
-def moves_rigidly(problem: Problem, space: Space, displacement: ng.GridFunction) -> bool:
-    """Whether the energy of a displacement is round-off: no body deforms."""
-    return energy_norm(problem, space, displacement) <= EXACT_ESTIMATE * space.terms(displacement)
 
 
 def estimates_rise(estimates: Sequence[float]) -> bool:
