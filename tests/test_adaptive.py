@@ -70,7 +70,7 @@ def test_elements_in_which_contact_ends_are_always_refined():
     assert last.transitions()[0, 0] == pytest.approx(1.545313, rel=4e-4)  # measured 1.6e-4
     # ... until they are small for the error there is.
     coarse = refinement(order=3, max_dofs=3000, ending=10.0)
-    *_, last = solving.levels(problem, first_mesh(problem, None), coarse)
+    *_, last = solving.levels(problem, first_mesh(problem, None), coarse, [])
     assert sides_at_the_end(last) == pytest.approx(1 / 8)
 
 
