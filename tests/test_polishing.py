@@ -21,6 +21,8 @@ from drivers.reference.cases import (
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, polish, solve
 from ngcontact.geometries import ball_on_block
+from ngcontact.polishing.geometric_mesh import END_RATIO, coarse_mesh
+from ngcontact.polishing.polishing import solve_bilateral
 from tests.given_meshes import two_blocks
 
 
@@ -102,6 +104,22 @@ def test_square_root():
     error = np.abs(pressure - case.exact.pressure(x))
     assert error[(x < -0.1) & (x > -0.9)].max() < 1e-4  # at vertices of the mesh
     assert np.median(error) < 1e-5
+
+
+def test_errors_fall_exponentially_with_the_third_root_of_unknowns():
+    """On one mesh with its vertex at the end of contact, orders 2 to 8."""
+    coarse, case = solved_root(), one_transition()
+    mesh = coarse_mesh(coarse.problem, coarse.pairs, 2.0)
+    [end] = mesh.ends
+    mesh = mesh.moved(end, -mesh.vertices[end.vertex, 0])
+    mesh = mesh.with_layers(end.vertex, END_RATIO, 6)
+    solutions = [solve_bilateral(coarse.problem, mesh, order) for order in (2, 4, 6, 8)]
+    error = np.log([relative_energy_error(one, case.exact) for one in solutions])
+    root = np.cbrt([one.displacement.space.ndof for one in solutions])
+    slope = -np.diff(error) / np.diff(root)
+    assert slope.min() > 0.4
+    assert slope.max() < 1.5 * slope.min()
+    assert error[-1] < np.log(1e-4)
 
 
 def refused():

@@ -11,8 +11,55 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact import Contact, Elastic, Problem, adapt, solve, solve_qp
+from ngcontact.problem.mesh_arrays import MeshArrays, move_vertices
 from tests.solids.meshes import boxes
-from tests.solids.test_patch import blocks, pressed
+from tests.solids.test_patch import TURN, blocks, pressed
+
+
+def figures(order, turn=None, length=1.0, modulus=1.0):
+    """Of a block pressed on another one by a gap, in their own axes and units."""
+    turn = np.eye(3) if turn is None else turn
+    mesh = boxes(("a", (0, 0, 0), (1, 1, 1), (3, 3, 3)), ("b", (0, 0, -1), (1, 1, 0), (2, 2, 2)))
+    move_vertices(mesh, length * MeshArrays(mesh).vertices @ turn.T)
+    own = [ng.InnerProduct(ng.CF(tuple(d)), ng.CF((ng.x, ng.y, ng.z))) for d in turn.T]
+    contact = Contact(
+        "a_bottom",
+        "b_top",
+        direction=tuple(-turn[:, 2]),
+        gap=0.1 * (own[0] ** 2 + own[1] ** 2) / length,
+    )
+    problem = Problem(
+        geometry=mesh,
+        materials={"a": Elastic(modulus, 0.3), "b": Elastic(3 * modulus, 0.2)},
+        displacement={"b_bottom": (0, 0, 0)},
+        sliding="a_left|b_left|a_front|b_front",
+        traction={"a_top": 0.02 * modulus},
+        contact=[contact],
+    )
+    solution = solve(problem, order=order)
+    assert solution.active.any()
+    assert not solution.active.all()
+    peak = solution.quantities()["peak pressure"].value
+    return np.array(
+        [
+            *solution.contact_force() @ turn / (modulus * length**2),
+            *(solution.reactions["a_left"] @ turn / (modulus * length**2)),
+            solution.energy / (modulus * length**3),
+            solution.contact_area() / length**2,
+            solution.pressure.max() / modulus,
+            peak / modulus,
+        ]
+    ), solution.relative_error_estimate
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_turns_and_units(order):
+    expected, estimate = figures(order)
+    for length, modulus in ((1.0, 1.0), (1e-9, 1e9), (1e9, 1e-9)):
+        found, other = figures(order, TURN, length, modulus)
+        # Required 1e-8; measured 1e-13.
+        assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
+        assert other == pytest.approx(estimate, rel=1e-11)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
