@@ -322,24 +322,18 @@ def _check_prescribed(
             )
 
 
-class _DependentRowsError(ValueError):
-    """Rows that contain the unknowns of each other, and cannot be told apart."""
-
-
-def _without_links(C: sp.csr_array, right: sp.csr_array, most: float) -> sp.csr_array:
+def _without_links(C: sp.csr_array, right: sp.csr_array, most: float) -> sp.csr_array | None:
     """Solution Y of (I + C) Y = `right`: rows that contain the unknowns of other rows.
 
-    Few do, where contact lines of several bodies share nodes. The condition number of those that
-    refer to each other is at `most` that.
+    Few do, where contact lines of several bodies share nodes. None where those that refer to each
+    other have a condition number of more than `most`.
     """
     linked, alone = np.flatnonzero(np.diff(C.indptr)), np.diff(C.indptr) == 0
     block = np.eye(linked.size) + C[linked][:, linked].toarray()
     _, group = connected_components(block, connection="strong")
     ring = np.flatnonzero(np.bincount(group)[group] > 1)
     if ring.size and np.linalg.cond(block[np.ix_(ring, ring)]) > most:
-        raise _DependentRowsError(
-            f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}"
-        )
+        return None
     known = sp.diags_array(alone.astype(float)) @ right
     place = sp.eye_array(C.shape[0], format="csr")[:, linked]
     return known + place @ sp.csr_array(np.linalg.inv(block)) @ (right - C @ known)[linked]
@@ -416,12 +410,12 @@ def change_of_basis(
     if of_row[column].any():  # unknowns of other rows
         right = from_triplets(value, row, column, (m, components.size))
         most = RING_CONDITION if stiffness is None else SOFT_CONDITION
-        try:
-            Y = _without_links(right[:, unknown].tocsr(), right, most).tocoo()
-        except _DependentRowsError:
-            if stiffness is None:
-                raise
+        Y = _without_links(right[:, unknown].tocsr(), right, most)
+        if Y is None and stiffness is None:
+            raise ValueError(f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}")
+        if Y is None:
             return change_of_basis(conditions, rows, length)  # the secondary hosts all
+        Y = Y.tocoo()
         row, column, value = Y.row, Y.col, Y.data
     column, unknown = components[column], components[unknown]
     node, i, j = blocks.nonzero()

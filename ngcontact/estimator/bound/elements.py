@@ -39,7 +39,7 @@ def traces(degree: int, t: Array) -> Array:
     return np.asarray(values * np.sqrt(2 * np.arange(degree + 1) + 1))
 
 
-def across(normal: Array, components: int) -> Array:
+def to_traction(normal: Array, components: int) -> Array:
     """Matrices (..., 2, v) that make s n of the v `components` of s; `normal` (..., 2) is n."""
     found = np.zeros((*normal.shape, components))
     found[..., 0, 0] = found[..., 1, -1] = normal[..., 0]
@@ -133,7 +133,7 @@ class Stress:
     def tractions(self, at: Index, x: Array, normal: Array) -> Array:
         """Tractions s n (k, q, 2) at `x` (k, q, 2) of `at` (k,), with unit `normal` (k, q, 2)."""
         s = self.values(at, x)
-        return np.asarray((across(normal, s.shape[2]) @ s[..., None])[..., 0])
+        return np.asarray((to_traction(normal, s.shape[2]) @ s[..., None])[..., 0])
 
     def traction_moments(self) -> tuple[Array, float]:
         """Moments (d,) of the tractions over all triangles, and the largest of one triangle."""
@@ -430,9 +430,9 @@ def _moments(
         x, dx = cells.around(at, i, t)
         local = CORNERS[i - 2] + t[:, None] * (CORNERS[i - 1] - CORNERS[i - 2])
         (A, P), s_p = columns(x, coordinates(corners, x) if bent else local)
-        to_traction = across(dx @ CLOCKWISE, s_p.shape[2])  # times ds / dt
+        n = to_traction(dx @ CLOCKWISE, s_p.shape[2])  # times ds / dt
         chi = ((w * cells.measure(x))[..., None] * traces(k, own))[:, None]
-        parts = ((to_traction @ A) @ P, to_traction @ s_p[..., None])
+        parts = ((n @ A) @ P, n @ s_p[..., None])
         traction = np.concatenate(parts, axis=3).transpose(0, 2, 3, 1)
         found += [*(traction @ chi).swapaxes(0, 1)]
     N = np.concatenate(found, axis=2) * there[:, None]
