@@ -11,7 +11,7 @@ from netgen.occ import Axis, OCCGeometry, Pnt, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, disc_on_disc, rings
+from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, rings
 from ngcontact.geometries.region import compound
 from ngcontact.plausibility import refinement_warning
 from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error
@@ -294,3 +294,17 @@ def test_estimates_of_solids_that_rise_are_told_with_their_place():
     place = message[message.index("near (") + 6 : message.index(") in body")].split(", ")
     corners = [mesh[v].point for v in mesh[ng.ElementId(ng.VOL, mesh.ne - 1)].vertices]
     assert [float(x) for x in place] == pytest.approx(np.mean(corners, axis=0), abs=1e-3)
+
+
+@pytest.mark.parametrize(("moduli", "told_of"), [((1.0, 1e12), False), ((1e12, 1.0), True)])
+def test_forces_that_round_off_takes_are_told(moduli, told_of):
+    """A stiff disc displaced by d: E eps d stands beside forces of d, 2.5 % at 1e12."""
+    problem = Problem(
+        geometry=disc_on_block(radius=1.0),
+        materials={"disc": Elastic(moduli[0], 0.3), "block": Elastic(moduli[1], 0.3)},
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.01)},
+        sliding="axis",
+        contact=[Contact("disc_arc", "block_top", direction=DOWN)],
+    )
+    found = told(lambda: solve(problem, maxh=0.15, order=2))
+    assert any("round-off" in message for message in found) == told_of
