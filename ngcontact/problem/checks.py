@@ -135,7 +135,10 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
 
 
 def check_numbers(view: MeshArrays) -> None:
-    """Refuse vertices of no element, as those of second order have, and facets that occur twice."""
+    """Refuse vertices of no element, as those of second order have, and facets that occur twice.
+
+    And outer sides that are no facets, which no estimate would see.
+    """
     unused = np.bincount(view.elements.ravel(), minlength=len(view.vertices)) == 0
     if unused.any():
         first = int(np.argmax(unused))
@@ -151,6 +154,13 @@ def check_numbers(view: MeshArrays) -> None:
             f"{np.count_nonzero(count > 1)} sides of elements occur twice in the boundaries of the "
             f"mesh, one with the vertices {corners}: what acts there would count twice; give every "
             "side one name"
+        )
+    sides = 2 * view.mesh.nfacet - (view.dim + 1) * view.mesh.ne  # inner ones belong to two
+    if sides != (named := np.count_nonzero(~view.inner_facets)):
+        raise ValueError(
+            f"the boundaries of the mesh have {named} of its {sides} outer sides, and estimates "
+            "would not see the others: give all of these a name, and no others, as "
+            "ngcontact.mesh.read does"
         )
 
 

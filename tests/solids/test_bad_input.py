@@ -98,9 +98,15 @@ def side_of_two_names(mesh):
     mesh.Add(Element2D(2, mesh.Elements2D()[0].vertices))
 
 
+def nameless_side(mesh):
+    mesh.DeleteSurfaceElement(0)
+    mesh.Compress()
+
+
 @pytest.mark.parametrize(
     ("mesh", "words"),
     [
+        (lambda: changed(nameless_side), "have 11 of its 12 outer sides, and estimates"),
         (lambda: MakeStructured3DMesh(hexes=True, nx=1), "1 hexahedra, prisms or pyramids"),
         (mirrored, r"24 inverted.*tetrahedra.*signed volume -?0\.0833"),
         (lambda: blocks(1, 1), 'body "upper" has no material'),
