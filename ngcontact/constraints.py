@@ -33,8 +33,8 @@ MIN_SINE = 1e-6  # sine below which two conditions at one node are the same
 INTERPOLATION_ERROR = 1e-8  # of prescribed values, relative to the largest: no interference
 COORDINATE_ERROR = 1e-13  # of gaps, relative to the largest coordinate: none either
 INDEPENDENT_ROWS = (
-    "exchange the sides of a pair whose secondary is the finer one and is held at an edge, give "
-    "each pair of boundaries once, or end one of them before that point"
+    "exchange the sides of a pair whose secondary is the finer one and is held at an edge, leave "
+    'out rows="nodal", give each pair of boundaries once, or end one of them before that point'
 )
 STIFFNESS_CONTRAST = 1e3  # of the secondary and what faces it, above which the latter hosts
 
