@@ -140,8 +140,8 @@ def _lost(solution: Solved) -> str:
         return ""
     return (
         f"round-off takes digits of forces: those on a stiff body, reactions included, are out of "
-        f"balance by about {lost:.1g} of those of contact. Displace the softer body, give its side as secondary, or "
-        "make the stiff one an obstacle (primary=None) or its moduli less"
+        f"balance by about {lost:.1g} of those of contact. Displace the softer body, give its side "
+        "as secondary, or make the stiff one an obstacle (primary=None) or its moduli less"
     )
 
 
