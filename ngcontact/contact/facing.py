@@ -191,7 +191,7 @@ def divided(
     segment, middle = segments[local], corners.sum(axis=1) / 2
     d = rays(trace, contact, segment, middle)
     met = partners(trace, facing, segment, trace.point(segment, middle), d)
-    on = met.segment >= 0
+    on = (met.segment >= 0) & ((trace.normal(segment, middle) * d).sum(axis=1) > FACING_COSINE)
     share = corners[on, 1] - corners[on, 0]
     return FacingPieces(local[on], corners[on], met.segment[on], met.s[on], share)
 

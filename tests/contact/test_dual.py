@@ -113,3 +113,16 @@ def test_overlapping_pairs_of_other_primaries_are_one(change, matched, order):
         forces = [solution.contact_force(pair) for pair in range(2)]
         np.testing.assert_allclose(sum(forces), [0.0, 2.0], atol=2e-10)
         assert all(len(list(solution.quantities(pair))) for pair in range(2))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_sides_along_the_direction_carry_nothing(order):
+    """Where other segments of the secondary face: their rows are those without the sides."""
+    case = cases.pressure_patch(p1=0.0)
+    mesh, forces = two_blocks(FIVE, 1.2 * SEVEN), []
+    for secondary in ("upper_contact", "upper_contact|upper_right"):
+        pair = Contact(secondary, "lower_contact", direction=(0, -1))
+        loads = {"displacement": {"bottom": (0, 0), "top": (0, -0.1)}, "traction": {}}
+        problem = replace(case.problem, geometry=mesh, contact=[pair], sliding=None, **loads)
+        forces.append(solve(problem, order=order).force)
+    np.testing.assert_allclose(forces[1], forces[0], rtol=EXACT)
