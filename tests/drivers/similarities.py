@@ -31,10 +31,9 @@ class Scene:
         return self.problem.contact[0]
 
 
-def on_its_mesh(problem: Problem, maxh: float, matched: bool = True) -> Scene:
-    """The scene of a problem on its first mesh, whose facing nodes lie opposite if `matched`."""
-    unmatched = None if matched else ng.Mesh(problem.geometry.GenerateMesh(maxh=maxh))
-    mesh, *_ = moved_mesh(unmatched or first_mesh(problem, maxh), AS_IT_IS)
+def on_its_mesh(problem: Problem, maxh: float) -> Scene:
+    """The scene of a problem on its first mesh."""
+    mesh, *_ = moved_mesh(first_mesh(problem, maxh), AS_IT_IS)
     value, view = np.zeros((mesh.nv, 2)), MeshArrays(mesh)
     ends = ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1, 1])
     nodes, names = view.facets, np.array(mesh.GetBoundaries())[view.boundaries]
@@ -57,20 +56,10 @@ def hertz_scene() -> Scene:
     return on_its_mesh(replace(problem, contact=[contact]), 0.25)
 
 
-def disc_scene(matched: bool = True) -> Scene:
+def disc_scene() -> Scene:
     """A polygonal disc on a block, gaps measured."""
-    scene = on_its_mesh(cases.pressed_disc(), 0.15, matched)
+    scene = on_its_mesh(cases.pressed_disc(), 0.15)
     return replace(scene, prescribed=20 * scene.prescribed)  # several nodes in contact
-
-
-def unmatched_disc() -> Scene:
-    """The same on a mesh whose facing nodes do not lie opposite to each other."""
-    return disc_scene(matched=False)
-
-
-def graph_scene() -> Scene:
-    """S8: two polygons in place of parabolas that face each other, gaps measured."""
-    return on_its_mesh(cases.curved_lines().problem, 0.15)
 
 
 def cornered() -> Scene:

@@ -2,21 +2,16 @@
 
 import ast
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 import pytest
 
 import ngcontact
-from drivers.adaptive_study.runs import smallest_angle
-from drivers.benchmark.__main__ import PARTS, Part, main
+from drivers.benchmark.__main__ import main
 from drivers.benchmark.engines import NotInstalledError, Run, kratos, needed, ngsolve
-from drivers.benchmark.scenes.meshes import KINDS, made
-from drivers.benchmark.scenes.plane import contact_end, peak, weights
 from drivers.benchmark.scenes.problems import block, disc
 from drivers.benchmark.studies import overhead, processes
 from ngcontact import adapt
-from ngcontact.discrete import MULTIGRID
 
 COMMON = {"disc": disc(), "block": block()}
 QUANTITIES = ("force", "peak", "half_width", "energy")
@@ -31,38 +26,27 @@ ALLOWED = {
 }
 
 
-def errors(run: Run) -> dict[str, float]:
-    reference = COMMON[run.problem].reference
-    return {q: abs(getattr(run, q) / getattr(reference, q) - 1) for q in QUANTITIES}
-
-
 def too_large(run: Run, **others: float) -> dict[str, float]:
     allowed = {**ALLOWED[run.problem, run.order], **others}
+    reference = COMMON[run.problem].reference
+    found = {q: abs(getattr(run, q) / getattr(reference, q) - 1) for q in QUANTITIES}
     # Written so that NaN is too large.
-    return {q: e for q, e in errors(run).items() if not e <= allowed[q]}
+    return {q: e for q, e in found.items() if not e <= allowed[q]}
 
 
 @pytest.mark.parametrize("name", COMMON)
-def test_active_set_finds_the_references(name: str):
+def test_engines_of_ngsolve_find_the_references(name: str):
     runs = list(ngsolve.ACTIVE_SET.runs(COMMON[name], ["graded"], [1000]))
-    assert [run.order for run in runs] == [1, 2]
-    assert [too_large(run) for run in runs] == [{}, {}]
-
-
-@pytest.mark.parametrize("name", COMMON)
-@pytest.mark.study(witness=["disc"])
-def test_large_penalties_find_the_references(name: str):
-    runs = list(ngsolve.PENALTY.runs(COMMON[name], ["graded"], [1000]))
-    assert [run.order for run in runs] == [1, 1, 1, 2, 2, 2]
-    stiff = [run for run in runs if run.engine == "NGSolve penalty 1000 E/h"]
-    assert [too_large(run) for run in stiff] == [{}, {}]
-    if name == "disc":  # theory: the error falls like 1 / penalty; measured 9e-3, 8e-4, 9e-5
-        low, middle, high = (errors(run)["energy"] for run in runs[3:])
-        assert 5 < low / middle < 20
-        assert 5 < middle / high < 20
+    if name == "disc":
+        penalties = ngsolve.PENALTY.runs(COMMON[name], ["graded"], [1000])
+        runs += [run for run in penalties if run.engine == "NGSolve penalty 1000 E/h"]
+    assert [run.order for run in runs] == [1, 2] * (len(runs) // 2)
+    assert [too_large(run) for run in runs] == [{}] * len(runs)
 
 
 def test_kratos_finds_the_references_or_is_missing_by_name():
+    with pytest.raises(NotInstalledError, match=r"Nothing needs no_such_code.*bench"):
+        needed("Nothing", "math", "no_such_code")
     try:
         runs = [run for c in COMMON.values() for run in kratos.MORTAR.runs(c, ["graded"], [1000])]
     except NotInstalledError as error:
@@ -71,11 +55,6 @@ def test_kratos_finds_the_references_or_is_missing_by_name():
     # Its contact follows the bodies' motion: measured 1.4e-4 of the block's force.
     others = {"disc": {}, "block": {"force": 3e-4}}
     assert [too_large(run, **others[run.problem]) for run in runs] == [{}, {}]
-
-
-def test_a_missing_package_is_named():
-    with pytest.raises(NotInstalledError, match=r"Nothing needs no_such_code.*bench"):
-        needed("Nothing", "math", "no_such_code")
 
 
 @pytest.mark.parametrize("name", COMMON)
@@ -95,45 +74,6 @@ def test_references_are_those_of_the_package(name: str):
     assert {q: e for q, e in difference.items() if e > allowed[q]} == {}
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", COMMON)
-@pytest.mark.study(witness=["block-uniform-2", "disc-uniform-2", "disc-uniform-1"])
-def test_meshes_have_the_size_asked_for(name: str, kind: str, order: int):
-    for size in (1000, 20_000):  # the larger ones are refined after meshing
-        mesh = made(COMMON[name], kind, order, size)
-        # Graded meshes stop at 5 %; refined ones and uniform ones come within 8 %.
-        assert abs(mesh.unknowns(order) / size - 1) < 0.1
-        assert (mesh.seconds > 0) == (kind == "uniform")
-        corners = mesh.points[mesh.triangles]
-        assert smallest_angle(corners) > 25  # measured 27 and more; slivers cost pressure
-    if name == "block":
-        sides = [np.unique(mesh.points[mesh.edges[f"{b}_contact"], 0]) for b in ("upper", "lower")]
-        np.testing.assert_allclose(*sides, rtol=0, atol=1e-12 * sides[0][-1])
-
-
-def test_readings_of_known_fields():
-    x, a = np.linspace(0, 1, 41), 0.61
-    gap = ((x - a) * (1 + x - a)).clip(0) ** 1.5
-    force = weights(x, 1) * np.where(x < a, 2 - 3 * x**2, 0)
-    # Both are parabolas where they are read, gap^(2/3) and the pressure: exact but for round-off.
-    assert contact_end(x, force, gap) == pytest.approx(a, rel=1e-9)
-    assert peak(x, force, 1) == pytest.approx(2, rel=1e-12)
-
-
-@pytest.mark.study
-def test_large_problems_take_the_path_asked_for():
-    usual = MULTIGRID.large
-    rows = [processes.measure("block", 1, 20_000, path) for path in processes.PATHS]
-    assert len({row.unknowns for row in rows}) == 1
-    assert all(row.seconds > 0 and row.memory > 0 for row in rows)
-    assert MULTIGRID.large is usual
-    one, other = rows
-    assert one.cycles < other.cycles
-    assert processes.of_large(rows).count("\n") == 2
-    assert f"| {other.systems} | {other.cycles} |" in processes.of_large(rows)
-
-
 def test_small_problems_do_not_stay_iterative():
     with pytest.raises(RuntimeError, match="1000 unknowns did not stay iterative"):
         processes.measure("block", 1, 1000, "iterative")
@@ -142,18 +82,11 @@ def test_small_problems_do_not_stay_iterative():
 @pytest.mark.study
 def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     found = main(["tax"], problems=["block"], rounds=1, max_dofs=10_000, out=tmp_path)
-    assert list(found) == ["tax"]
-    sizes = [row["unknowns"] for row in found["tax"]]
-    assert len(sizes) == 2 * 2  # orders, sizes
-    assert max(sizes) < 11_000
+    assert len(found["tax"]) == 2 * 2  # orders, sizes
     assert all(float(row[k]) > 0 for row in found["tax"] for k in ("linear, s", "cold", "warm"))
     [path] = tmp_path.iterdir()
     assert path.name == "benchmark_tax.md"
     assert path.read_text() in capsys.readouterr().out
-
-
-def test_every_part_has_its_name():
-    assert get_args(Part) == tuple(PARTS)
 
 
 def test_every_stage_of_a_level_is_found():

@@ -271,15 +271,3 @@ def test_relative_energy_error_refuses():
     solution.problem.model = "plane stress"
     with pytest.raises(ValueError, match="plane stress"):
         relative_energy_error(solution, exact)
-
-
-@pytest.mark.parametrize(
-    ("function", "data", "message"),
-    [
-        (rings, {"qi": math.nan}, "separate"),
-        (rings, {"qn": 2.0}, "separate"),
-    ],
-)
-def test_bad_data_are_refused(function, data, message):
-    with pytest.raises(ValueError, match=message):
-        function(UPPER, LOWER, **data)

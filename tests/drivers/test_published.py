@@ -1,21 +1,10 @@
 """Problems that other codes publish: statements, closed forms, and small runs."""
 
-from typing import get_args
-
 import pytest
 
 from drivers import published as driver
 from drivers.published import PUBLISHED
 from drivers.reference.half_spaces import Hertz
-
-
-def test_every_problem_can_be_asked_for_and_has_its_source():
-    assert get_args(driver.Name) == tuple(PUBLISHED)
-    assert len(PUBLISHED) >= 8
-    for problem in PUBLISHED.values():
-        assert len(problem.source) > 20
-        assert problem.why.endswith(".")
-        assert problem.figures
 
 
 def test_closed_forms_give_the_published_figures():
@@ -30,24 +19,18 @@ def test_closed_forms_give_the_published_figures():
 
 @pytest.mark.parametrize(
     ("name", "max_dofs"),
-    [
-        ("patch test", 1000),
-        ("rotating rings", 3000),
-        pytest.param("rounded punch", 50_000, marks=pytest.mark.study),
-    ],
+    [("patch test", 1000), ("rotating rings", 3000), ("rounded punch", 50_000)],
 )
+@pytest.mark.study(witness=["patch test-1000", "rotating rings-3000"])
 def test_computed_figures_are_the_published_ones(name, max_dofs):
-    published = PUBLISHED[name]
-    solution = driver.solved(published, 2, max_dofs)
-    for figure, (_, _, _, difference) in zip(
-        published.figures, driver.rows_of(published.figures, solution), strict=True
-    ):
-        assert abs(difference) <= figure.within
+    figures = PUBLISHED[name].figures
+    solution = driver.solved(PUBLISHED[name], 2, max_dofs)
+    for figure, row in zip(figures, driver.rows_of(figures, solution), strict=True):
+        assert abs(row[3]) <= figure.within
 
 
-def test_a_page_is_written(tmp_path, capsys):
+def test_a_page_is_written(tmp_path):
     driver.main(("patch test",), order=1, max_dofs=500, page=tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert "| mean pressure, Pa | 100000 | 100000 |" in text
     assert PUBLISHED["patch test"].source in text
-    assert "Contact patch test" in capsys.readouterr().out

@@ -1,6 +1,5 @@
 """The package as others get it: what a wheel holds, one version, and which Python is taken."""
 
-import os
 import re
 import shutil
 import subprocess
@@ -59,28 +58,3 @@ def test_one_version_everywhere():
     [cited] = re.findall(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
     newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
     assert (cited, newest[1]) == (ngcontact.__version__, ngcontact.__version__)
-
-
-def test_a_stub_on_the_path_is_no_interpreter(tmp_path):
-    """A version manager's stub comes first on the path and fails; the Python it is for is found."""
-    stub = tmp_path / "shims" / "python3.99"
-    kept = tmp_path / "pyenv" / "versions" / "3.99.0" / "bin" / "python3.99"
-    for path, text in ((stub, "exit 127"), (kept, f'exec "{sys.executable}" "$@"')):
-        path.parent.mkdir(parents=True)
-        path.write_text(f"#!/bin/sh\n{text}\n")
-        path.chmod(0o755)
-    surroundings = {
-        "PATH": f"{stub.parent}{os.pathsep}{os.environ['PATH']}",
-        "PYENV_ROOT": str(tmp_path / "pyenv"),
-    }
-
-    def found(name):
-        result = subprocess.run(
-            [ROOT / ".ci" / "interpreters", name], env=surroundings, capture_output=True, text=True
-        )
-        return result.stdout.split(maxsplit=1)
-
-    version, path = found("python3.99")
-    assert version == f"{sys.version_info[0]}.{sys.version_info[1]}"
-    assert Path(path.strip()).resolve() == Path(sys.executable).resolve()
-    assert found(str(stub)) == found("python3.98") == []
