@@ -52,10 +52,7 @@ def rows(n, *entries, g=None):
 def test_matrix_of_rows():
     contact = rows(4, (0, (0.6, 0.8), {2: 0.25, 3: 0.75}), (1, X, {}))
     B = contact.matrix
-    expected = [
-        [0.6, 0, -0.15, -0.45, 0.8, 0, -0.2, -0.6],
-        [0, 1, 0, 0, 0, 0, 0, 0],
-    ]
+    expected = [[0.6, 0, -0.15, -0.45, 0.8, 0, -0.2, -0.6], [0, 1, 0, 0, 0, 0, 0, 0]]
     np.testing.assert_allclose(B.toarray(), expected, atol=1e-16)
     assert B.nnz == 7  # nothing stored where the partner has no share
     assert rows(3).matrix.shape == (0, 6)
@@ -66,10 +63,7 @@ def test_rows_joined_and_selected_are_the_same():
     whole = rows(5, *entries, g=[0.1, 0.2, 0.3])
     parts = [rows(5, entry, g=[gap]) for entry, gap in zip(entries, whole.g, strict=True)]
     together = joined([no_rows(5), *parts])
-    for one, other in (
-        (together, whole),
-        (whole.select(np.array([2, 0])), joined(parts[::-2])),
-    ):
+    for one, other in ((together, whole), (whole.select(np.array([2, 0])), joined(parts[::-2]))):
         assert (one.matrix != other.matrix).nnz == 0
         np.testing.assert_array_equal(one.node, other.node)
         np.testing.assert_array_equal(one.g, other.g)

@@ -49,10 +49,7 @@ def stack() -> Problem:
         sliding="b_left|c_left",
         traction={"c_above": (0.0, -0.1 * (1 + ng.x))},
         force={"b": (0, -0.05)},
-        contact=[
-            Contact("b_below", "a_above"),
-            Contact("c_below", "b_above", direction=(0, -1)),
-        ],
+        contact=[Contact("b_below", "a_above"), Contact("c_below", "b_above", direction=(0, -1))],
     )
 
 

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import (
-    Contact,
-    ConvergenceError,
-    Elastic,
-    NoEquilibriumError,
-    Problem,
-    adapt,
-    solve,
-)
+from ngcontact import Contact, ConvergenceError, Elastic, NoEquilibriumError, Problem, adapt, solve
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.geometries import rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
@@ -129,15 +121,6 @@ def test_a_load_beside_the_end_of_contact():
     per_tenth = 4.0**2 / modulus * (half_plane + quarter / 2) * math.log(10)
     # The energies of both have relative errors below 1e-4, of which their difference is a fifth.
     assert energies[0] - energies[1] == pytest.approx(per_tenth, rel=1e-3)
-
-
-def test_forces_on_one_face_of_a_notch():
-    """A motion opens the other one, and the force is spread: the disc slides until it touches."""
-    problem = replace(resting(), force={"disc": (WEIGHT, -WEIGHT)})
-    solution = solve(problem, maxh=0.25, order=2)
-    disc = WEIGHT * mesh_area(solution, "disc")
-    forces = np.array([solution.contact_force(k) for k in range(2)])
-    assert np.abs(forces - disc * np.array([[0, 0], [-1, 1]])).max() <= 1e-10 * disc
 
 
 IMBALANCE = 1e-5  # of the size of the load

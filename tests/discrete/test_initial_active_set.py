@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import ngsolve as ng
 import numpy as np
 import pytest
 
@@ -10,7 +9,7 @@ from drivers.reference import cases
 from ngcontact import Contact, ConvergenceError, Elastic, Problem, solve
 from ngcontact.contact import ContactState
 from ngcontact.discrete import carried_active_set, discretise, first_active_set
-from ngcontact.geometries import blocks, punch
+from ngcontact.geometries import punch
 from ngcontact.mesh import curve, first_mesh
 
 
@@ -91,39 +90,3 @@ def test_a_stiff_punch_held_by_contact_alone_is_right_or_refused() -> None:
 
 
 SOFT, HARD = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
-
-
-def penetration(solution, samples=20):
-    """Values n.(u' - u'') (k, samples) on the matched segments of a polygonal zone."""
-    trace, line = solution.discrete.space.trace, solution.discrete.lines[0]
-    assert line.searches == 0
-    ends = {frozenset(map(tuple, np.round(trace.curve[k], 9))): k for k in line.facing}
-    found = []
-    for k in line.segments:
-        opposite = ends[frozenset(map(tuple, np.round(trace.curve[k], 9)))]
-        here, there = np.full(samples, k), np.full(samples, opposite)
-        s = np.linspace(0, 1, samples)
-        turned = np.linalg.norm(trace.curve[k, 0] - trace.curve[opposite, 0]) > 1e-6
-        t = 1 - s if turned else s
-        np.testing.assert_allclose(trace.point(here, s), trace.point(there, t), atol=1e-14)
-        first = trace.evaluate(solution.displacement, here, s)
-        second = trace.evaluate(solution.displacement, there, t)
-        found.append(((first - second) * trace.normal(here, s)).sum(axis=1))
-    return np.array(found)
-
-
-@pytest.mark.parametrize("tilt", [-0.06, 0.0, 0.08])
-@pytest.mark.parametrize("maxh", [0.6, 0.2])
-def test_polygonal_zones_are_free_of_penetration_everywhere(tilt, maxh):
-    """Lemma 2.1 of HH81: the nodal conditions hold between the nodes, K_h lies in K."""
-    down = {"top": ng.CF((0.02, -0.01 + tilt * ng.x)), "bottom": (0, 0)}
-    problem = cases.touching_blocks(down, geometry=blocks(line=cases.LINE))
-    solution = solve(problem, maxh=maxh)
-    closed = penetration(solution)
-    assert closed.max() <= 1e-15  # round-off of displacements of size 0.1
-    # The zone is open in part, and the nodes at the corners meet both conditions.
-    assert 0 < np.count_nonzero(solution.active) < len(solution.active)
-    assert closed.min() < -1e-3
-    doubled = np.bincount(solution.discrete.lines[0].node) == 2
-    assert np.count_nonzero(doubled) == 2
-    assert (solution.gap >= -1e-15).all()

@@ -2,8 +2,7 @@
 
 A public function, class or attribute whose annotation has an array says for each array parameter
 or attribute its name with a shape, in an entry ``name : ndarray (m, 2)`` or as "`name` (m, 2)" in
-the text, fields also in a comment at their line or above it; for arrays it returns as many shapes,
-or one and "each".
+the text, fields also in a comment at their line or above it; and a shape of what it returns.
 """
 
 import ast
@@ -16,30 +15,18 @@ import ngcontact.geometries as geometries
 from ngcontact import Solution
 from tests.docs.pages import ROOT
 
-TYPES = {"Array", "Index", "Mask", "NDArray", "ndarray", "ArrayLike"}
-TYPES |= {"sparray", "spmatrix", "csr_array", "csc_array"}
+_ARRAYS = "Array|Index|Mask|NDArray|ndarray|ArrayLike|sparray|spmatrix|csr_array|csc_array"
+ARRAY = re.compile(rf"\b({_ARRAYS})\b")
 # "(m, 2)", "(n,)", "(3 b, r)", "(k, order + 1)", but not "(x, y)" nor "(Judice, Pires 1994)".
 _TERM = r"(?:\d+|\d*\s?(?:[a-wA-Z]|ne|nv|dim|(?:geometry_)?order|degree)(?!\w))"
 _DIMENSION = rf"(?:\.\.\.|{_TERM}(?:\s?[-+*]\s?{_TERM})*)"
-RETURNED = ("Returns", "Yields")
 SHAPE = re.compile(rf"\({_DIMENSION},(?:\s{_DIMENSION},)*(?:\s{_DIMENSION})?\)")
 
 
-def arrays_in(annotation):
-    """Number of arrays in an annotation; what functions in it take or return does not count."""
-    match annotation:
-        case None | ast.Subscript(value=ast.Name(id="Callable")):
-            return 0
-        case ast.Constant(value=str(text)):
-            return arrays_in(ast.parse(text, mode="eval").body)
-        case ast.Subscript(value=value) if arrays_in(value):
-            return 1
-        case ast.BinOp(left=left, right=right):  # alternatives
-            return max(arrays_in(left), arrays_in(right))
-        case ast.Name(id=name) | ast.Attribute(attr=name):
-            return int(name in TYPES)
-        case _:
-            return sum(map(arrays_in, ast.iter_child_nodes(annotation)))
+def has_arrays(annotation):
+    """Whether an annotation has an array; what functions in it take or return does not count."""
+    text = ast.unparse(annotation).strip("'") if annotation else ""
+    return bool(ARRAY.search(re.sub(r"Callable\[.*\]", "", text)))
 
 
 def in_words(name):
@@ -67,26 +54,16 @@ def comment(lines, field):
     return " ".join(lines[at + 1 : stop + 1])
 
 
-def shapes_returned(docstring):
-    """Number of arrays that a docstring gives shapes of, those of parameters aside."""
-    words, *parts = re.split(r"^(\w[\w ]*)\n-+$", docstring, flags=re.MULTILINE)
-    returned = "".join(parts[k + 1] for k, title in enumerate(parts) if title in RETURNED)
-    told = sum(
-        len(names.split(",")) * bool(SHAPE.search(entry(returned, names)))
-        for names in re.findall(r"^(\S[^:\n]*?)(?: : .*)?$", returned, re.MULTILINE)
-    )
-    shapes = len(SHAPE.findall(re.sub(in_words(r"\w+"), "", words)))
-    return float("inf") if shapes and re.search(r"\beach\b", words) else told + shapes
-
-
 def of_function(owner, node, docstring):
     """Claims (what, whether the docstring holds it) of parameters and of what is returned."""
     for parameter in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]:
-        if arrays_in(parameter.annotation):
+        if has_arrays(parameter.annotation):
             said = entry(docstring, parameter.arg)
             yield f"{owner}({parameter.arg})", bool(SHAPE.search(said))
-    if count := arrays_in(node.returns):
-        yield f"{owner} -> shape", shapes_returned(docstring) >= count
+    if has_arrays(node.returns):
+        words, _, parts = docstring.partition("Parameters\n------")
+        rest = re.sub(in_words(r"\w+"), "", words) + parts.partition("Returns\n------")[2]
+        yield f"{owner} -> shape", bool(SHAPE.search(rest))
 
 
 def claims(path):
@@ -102,7 +79,7 @@ def claims(path):
         for part in node.body:
             match part:
                 case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation):
-                    if arrays_in(annotation) and not name.startswith("_"):
+                    if has_arrays(annotation) and not name.startswith("_"):
                         said = entry(docstring, name) + comment(source.splitlines(), part)
                         yield f"{owner}.{name}", bool(SHAPE.search(said))
                 case ast.FunctionDef(name="__init__"):

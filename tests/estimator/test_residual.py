@@ -94,17 +94,6 @@ def only(solution, *names):
     return [parts[name] for name in names]
 
 
-def test_traction_part_of_a_pressure_that_varies(patch):
-    solution = altered(patch, traction={"lower_left": ng.y})
-    [value] = only(solution, "traction")
-    trace = patch.discrete.space.trace
-    segments = trace.segments("lower_left")
-    (a, b) = trace.curve[segments][:, [0, -1], 1].T
-    h, mu, length = along(patch, "lower_left")
-    squares = (a * a + a * b + b * b) / 3 * length  # integral of y^2 on each segment
-    assert value == pytest.approx((h / (2 * mu) * squares).sum(), rel=1e-12)
-
-
 @pytest.mark.parametrize("order", [2, 3, 4])
 def test_element_part_sees_the_divergence(order):
     # u = (x^2, 0) has div sigma = (2 (lambda + 2 mu), 0), and weights are in (h / p)^2.

@@ -149,10 +149,7 @@ def error(solution, exact):
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize(
     ("model", "along", "across"),
-    [
-        ("plane stress", 1 / 2, -0.3 / 2),
-        ("plane strain", (1 - 0.3**2) / 2, -0.3 * (1 + 0.3) / 2),
-    ],
+    [("plane stress", 1 / 2, -0.3 / 2), ("plane strain", (1 - 0.3**2) / 2, -0.3 * (1 + 0.3) / 2)],
 )
 def test_bar_in_tension(model, along, across, order):
     """Stress 1 in x, E = 2, nu = 0.3: the lateral strain is free in the plane only."""

@@ -10,11 +10,7 @@ from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg import sparse
 from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
-from ngcontact.linalg.sparse import (
-    cholesky_of_closed_rows,
-    congruent,
-    shared,
-)
+from ngcontact.linalg.sparse import cholesky_of_closed_rows, congruent, shared
 
 FIRST = 4  # vertices of each line at first
 

@@ -7,12 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact.linalg.iterative import IterativeSystems, Limits
-from ngcontact.linalg.multigrid import (
-    LONG_ROWS,
-    GaussSeidel,
-    StalledError,
-    truncated_multigrid,
-)
+from ngcontact.linalg.multigrid import LONG_ROWS, GaussSeidel, StalledError, truncated_multigrid
 from ngcontact.linalg.sparse import cholesky, congruent, handed_over
 from ngcontact.qp import BorderedSystems, Iterate, minimise
 from tests.scenes import REFINED, discrete, steps_of

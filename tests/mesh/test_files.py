@@ -229,10 +229,7 @@ def changed(file, points=None, more=()):
         (changed(square(), [(0, 0, 0), (1, 0, 0), (1, 1, 1), (0, 1, 1)]), "do not lie in a plane"),
         (changed(square(), more=[("line", np.array([[1, 3]]), "cut")]), '\'?"cut" is no side'),
         (changed(square(), more=[("tri", np.array([[0, 1, 2]]), "twin")]), "overlap on"),
-        (
-            changed(square("tri"), [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)]),
-            "degenerate",
-        ),
+        (changed(square("tri"), [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)]), "degenerate"),
         (File(square().points, square().blocks[:1]), "no triangles or quadrilaterals"),
         (changed(square(), [(0, math.nan), (1, 0), (1, 1), (0, 1)]), "1 coordinates of nodes are"),
         (changed(square(), [(0, 0), (1, 0), (1, 1)]), "cells with nodes that it does not have"),

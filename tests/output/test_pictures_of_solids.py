@@ -1,12 +1,10 @@
 """Pictures of solids: what is cut, where, and which pressure is drawn; options that are refused."""
 
-from dataclasses import replace
-
 import matplotlib.image
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Axis, Box, Compound, OCCGeometry, Pnt, Sphere, X, Z
+from netgen.occ import Box, Compound, OCCGeometry, X, Z
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solids, write_film
@@ -98,20 +96,6 @@ def test_what_is_refused(tmp_path):
     assert not path.exists()
 
 
-def test_every_profile_is_drawn_and_the_pair_is_named(tmp_path):
-    """Four of them, each with a stroke of its own; of several pairs the one that is drawn."""
-    problem = pressed_cube(2).problem
-    pairs = [Contact("block_top", gap=1.0, direction=(0, 0, 1)), *problem.contact]
-    solution = solve(replace(problem, contact=pairs), maxh=0.7, order=2)
-    profile = {f"p{k}": (lambda s, k=k: 0 * s + 0.1 * k) for k in range(4)}
-    figure = plot_solids(solution, tmp_path / "cube.png", profile=profile)
-    drawn = [line for line in panel(figure, "contact pressure").lines if line.get_color() == "k"]
-    assert [line.get_label() for line in drawn] == list(profile)
-    assert len({line.get_linestyle() for line in drawn}) == 4
-    title = panel(figure, "pressure on").get_title()
-    assert title == "pressure on cube_bottom\npair 1, of 2 that of the largest force"
-
-
 def boxes(**corners):
     """Solids, each made of boxes given by opposite corners; faces are named as "slab_left"."""
     solids = []
@@ -144,25 +128,6 @@ def test_upright_faces_in_contact_are_seen_from_above(sliding, tmp_path):
     assert 0.05 < (image.get_array() == 255).all(axis=2).mean() < 0.7  # bodies and background
 
 
-@pytest.mark.parametrize(
-    ("degrees", "words"),
-    [(1e-3, ["y", "z"]), (2.0, ["y", "z"]), (30.0, ["along (-0.5, 0.87, 0)", "z"])],
-)
-def test_cuts_are_named_after_the_axes_they_follow(degrees, words, tmp_path):
-    """Also where the mean of the normals is a little off one."""
-    shape = boxes(wall=[((-1, 0, 0), (0, 1, 1))], slab=[((0, 0, 0), (1, 1, 1))]).shape
-    problem = Problem(
-        geometry=OCCGeometry(shape.Rotate(Axis((0, 0, 0), Z), degrees)),
-        materials={"wall|slab": Elastic(E=1.0, nu=0.0)},
-        displacement={"wall_left": (0, 0, 0)},
-        traction={"slab_right": PRESSURE},
-        contact=[Contact("slab_left", "wall_right")],
-    )
-    figure = plot_solids(solve(problem, maxh=1.0, order=1), tmp_path / "a.png")
-    lines = panel(figure, "contact pressure").lines
-    assert [line.get_label() for line in lines[:2]] == words
-
-
 def test_a_zone_of_two_parts_is_cut_in_one_and_not_joined(tmp_path):
     """A plate on two columns: the middle of their tops is in the air."""
     columns = [((-1, 0, -1), (-0.5, 1, 0)), ((0.5, 0, -1), (1, 1, 0))]
@@ -178,30 +143,6 @@ def test_a_zone_of_two_parts_is_cut_in_one_and_not_joined(tmp_path):
     assert np.isnan(x.get_ydata()).sum() == 1
     assert not np.isnan(y.get_ydata()).any()
     assert np.nanmin(x.get_ydata()) > 0  # also on the other column
-
-
-def test_of_a_closed_surface_the_front_is_drawn(tmp_path):
-    """A ball that swells in a rigid shell: pressures of its back lie behind those of its front."""
-    ball = Sphere(Pnt(0, 0, 0), 1.0)
-    ball.solids.name, ball.faces.name = "ball", "skin"
-    problem = Problem(
-        geometry=OCCGeometry(ball),
-        materials={"ball": Elastic(E=1.0, nu=0.3)},
-        strain={"ball": 1e-3},
-        contact=[Contact("skin", gap=0.0)],
-    )
-    figure = plot_solids(solve(problem, maxh=0.7, order=1), tmp_path / "a.png")
-    (drawn, *_) = panel(figure, "pressure on skin").collections
-    a, b, c = np.array([path.vertices[:3] for path in drawn.get_paths()]).transpose(1, 2, 0)
-    area = np.abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).sum() / 2
-    assert area == pytest.approx(np.pi, rel=0.3)  # of its shadow: that of a coarse polyhedron
-
-
-def test_without_contact_the_bodies_are_drawn(tmp_path):
-    problem = replace(pressed_cube(1).problem, contact=[], traction={}, sliding="cube_bottom")
-    free = replace(problem, displacement={"block_bottom|cube_top": (0, 0, 0)})
-    figure = plot_solids(solve(free, maxh=0.7, order=1), tmp_path / "a.png")
-    assert panel(figure, "deformed").images
 
 
 def test_what_is_positive_has_no_negative_colours(tmp_path):

@@ -1,59 +1,18 @@
-"""Each thing stands in one place of the package; objects have their attributes from the start."""
+"""Each thing stands in one place of the package, and chains of imports are short."""
 
 import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 
 FILES = [*(ROOT / "ngcontact").rglob("*.py"), *(ROOT / "geometries").glob("*.py")]
 SOURCES = {path.resolve().relative_to(ROOT).as_posix(): path.read_text() for path in FILES}
-TREES = {path: ast.parse(source) for path, source in SOURCES.items()}
-CLASSES = [x for tree in TREES.values() for x in ast.walk(tree) if isinstance(x, ast.ClassDef)]
 
 
 def with_lines(pattern: str) -> set[str]:
     """Modules with a line that has the pattern."""
     return {path for path, source in SOURCES.items() if re.search(pattern, source)}
-
-
-def bound(function: ast.AST) -> set[str]:
-    """Attributes that a method sets on its ``self``."""
-    return {
-        node.attr
-        for node in ast.walk(function)
-        if isinstance(node, ast.Attribute)
-        and isinstance(node.ctx, ast.Store)
-        and isinstance(node.value, ast.Name)
-        and node.value.id == "self"
-    }
-
-
-def fields_of(cls: ast.ClassDef) -> set[str]:
-    """Names of the fields of a class and of those it derives from."""
-    bases = {ast.unparse(base) for base in cls.bases}
-    own = {ast.unparse(x.target) for x in cls.body if isinstance(x, ast.AnnAssign)}
-    return own.union(*(fields_of(c) for c in CLASSES if c.name in bases))
-
-
-def bound_late(tree: ast.AST) -> Iterator[str]:
-    """Attributes that are no fields of a class and that another method than __init__ binds."""
-    for cls in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
-        methods = [node for node in cls.body if isinstance(node, ast.FunctionDef)]
-        known = fields_of(cls)
-        for method in methods:
-            known |= bound(method) if method.name == "__init__" else set()
-        for method in methods:
-            yield from (f"{cls.name}.{name} in {method.name}" for name in bound(method) - known)
-
-
-def test_attributes_are_bound_where_objects_are_made():
-    source = "class A:\n a: int\n def __init__(self): self.b = 0\n def f(self): self.a = self.c = 1"
-    assert list(bound_late(ast.parse(source))) == ["A.c in f"]
-    assert len(TREES) > 80  # about the number of today: who finds nothing finds no fault
-    late = {path: list(bound_late(tree)) for path, tree in TREES.items()}
-    assert {path: names for path, names in late.items() if names} == {}
 
 
 def test_types_of_arrays_stand_in_one_module():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Axis, Box, OCCGeometry, X, Y, Z
+from netgen.occ import Axis, OCCGeometry, Z
 
 from ngcontact import ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.adaptivity import below_resolution
@@ -72,24 +72,6 @@ def test_a_guide_off_by_the_seventh_digit_contradicts_nothing():
         loaded(), geometry=geometry, displacement={"bottom": (0, 0.1)}, sliding="left"
     )
     assert contradictions(problem, first_mesh(problem, 0.4)) == []
-
-
-def test_the_support_is_named_that_leads_across_a_guide():
-    """At the corner of three faces the larger of two values counts, which is that of "back"."""
-    box = Box((0, 0, 0), (1, 1, 1))
-    box.faces.Min(X).name, box.faces.Min(Y).name, box.faces.Min(Z).name = "left", "back", "bottom"
-    problem = Problem(
-        geometry=OCCGeometry(box),
-        materials={".*": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (0.1, 0, 0), "back": (0.2, 0, 0)},
-        sliding="left",
-    )
-    found = contradictions(problem, first_mesh(problem, 1.0))
-    told = {one.message for one in found if "guide" in one.message}
-    amounts = {"bottom": "-0.1", "back": "-0.2"}
-    assert told == {
-        f'displacement "{name}" leads {u} across the guide "left"' for name, u in amounts.items()
-    }
 
 
 def test_round_off_is_no_contradiction():

@@ -232,7 +232,7 @@ def test_bodies_on_top_of_each_other():
     ("data", "words"),
     [
         ({"a_left": (0, 0, 0), "a_back": (0, 0, 0.1)}, "prescribe 0 and 0.1 along z at their edge"),
-        ({"a_left": (None, 0.1, 0), "sliding": "a_front"}, "leads -?0.1 across the guide"),
+        ({"a_left": (None, 0.1, 0), "sliding": "a_front"}, '"a_left" leads -?0.1 across the guide'),
         ({"a_left|a_back": (0, 0, ng.x)}, ""),
         ({"a_left": (0.1, 0, 0), "sliding": "a_front"}, ""),
     ],
