@@ -498,9 +498,7 @@ def levels(
         if not unresolved_data and (error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution)):
             return
         expected = ratio * estimate if guaranteed else error
-        of_data = np.any(
-            [np.zeros_like(excluded), *(one.elements for one in unresolved_data)], axis=0
-        )
+        of_data = np.any([np.zeros_like(excluded), *unresolved_data.values()], axis=0)
         plan = next_plan(solution, refinement, plan, goal / expected if expected else 1.0, of_data)
         if plan.ends or (plan.stuck and not warned):
             warned = True

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
@@ -33,12 +32,6 @@ HALVINGS = 24  # of the distance between two points: what still changes across 1
 # What `_moduli` has of laws of numbers, by the model.
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
 
-# Voigt strains of a unit of volume, without change of volume, and of shear, as rows.
-VOLUMETRIC = {
-    3: np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]]),
-    4: np.array([[1 / 3, 1 / 3, 1 / 3, 0], [0.5, -0.5, 0, 0], [0.5, 0.5, -1, 0], [0, 0, 0, 1.0]]),
-}
-VOLUMETRIC[6] = block_diag(VOLUMETRIC[4][:3, :3], np.eye(3))
 SHEARS = {3: 1, 4: 1, 6: 3}  # how many of the last components are shear
 
 # Where a law that varies is looked at in each element: its middle and towards its corners.
@@ -93,10 +86,11 @@ def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Mod
 
 def _moduli(C: Array) -> Array:
     """Fields (4, k) of `Moduli` by laws `C` (k, n, q, q) at points of k elements."""
-    strains, kappa = mandel(C), _bulk(C)
+    strains, dilatation = mandel(C), np.ones(C.shape[-1])
     smallest = np.linalg.eigvalsh(strains)[..., 0]  # (2.7)
-    dilatation = np.ones(C.shape[-1])
     dilatation[-SHEARS[C.shape[-1]] :] = 0.0
+    # By Cauchy and Schwarz; round-off stays that of C, nearly singular or not.
+    kappa = 1 / (np.linalg.solve(C, dilatation[:, None])[..., 0] @ dilatation)
     rest = strains - kappa[..., None, None] * np.outer(dilatation, dilatation)
     rigidity = np.linalg.eigvalsh(rest)[..., -1].max(axis=1) / 2
     ratio = 2 * kappa[:, 0] / smallest[:, 0]
@@ -143,19 +137,6 @@ def mandel(C: Array) -> Array:
     return C * scale * scale[:, None]
 
 
-def _bulk(C: Array) -> Array:
-    """The largest kappa (...) <= e : C e / (tr e)^2 of laws (..., q, q).
-
-    A Schur complement in C on volumetric, deviatoric and shear strain, which does not cancel where
-    C_11, C_12 and C_22 are nearly equal.
-    """
-    size = np.abs(C).max(axis=(-2, -1))
-    T = VOLUMETRIC[C.shape[-1]]
-    D = T @ (C / size[..., None, None]) @ T.T
-    bend = np.linalg.solve(D[..., 1:, 1:], D[..., 1:, :1])
-    return np.asarray(size * (D[..., 0, 0] - (D[..., :1, 1:] @ bend)[..., 0, 0]))
-
-
 def nearly_incompressible(
     problem: Problem, mesh: ng.Mesh, limit: float, ratio: Array | None = None
 ) -> dict[str, float]:
@@ -180,14 +161,6 @@ def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
         )
 
 
-class Jump(NamedTuple):
-    """Jump of a law in one element."""
-
-    place: tuple[float, float]  # lengths
-    low: float  # the value on one side of the component that jumps
-    high: float  # and on the other
-
-
 @dataclass(frozen=True, eq=False)
 class RoughElements:
     """Elements of about one size in which a law, or a strain, changes by a share of itself, k."""
@@ -198,8 +171,8 @@ class RoughElements:
     values: Array  # (k, n, q q), or (k, n, c), at the points of a lattice
     limit: Array  # (k,), of a change
 
-    def jumps(self) -> dict[int, Jump]:
-        """Jumps by number of the element, at most one in each.
+    def jumps(self) -> dict[int, tuple[Array, Array]]:
+        """Places (2,), and values (2,) on both sides, by number of the element, one in each.
 
         From the points of a lattice at which a component is least and largest, the half of their
         distance across which it changes more is kept, again and again: a smooth change shrinks by
@@ -215,35 +188,29 @@ class RoughElements:
             side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
             x[row, side], u[row, side] = middle, v
         kept = np.ptp(u, axis=1) > self.limit
-        places, u = self.view.positions(self.at[kept], x[kept, 0]), np.sort(u[kept], axis=1)
-        found = zip(places.tolist(), *u.T.tolist(), strict=True)
-        return {k: Jump((x, y), *of) for k, ((x, y), *of) in zip(self.at[kept], found, strict=True)}
+        places = self.view.positions(self.at[kept], x[kept, 0])
+        return dict(zip(self.at[kept], zip(places, u[kept], strict=True), strict=True))
 
 
 def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements]]:
     """Elements in which laws are rough, then initial strains, by the body."""
-    view = SampledElements(mesh, 2)
-    for pattern, law in problem.materials.items() if mesh.dim == 2 else ():
-        if not varies(law):
-            continue
-        C = law.voigt(problem.model)
-        for here, values in view.samples(C, view.inside(mesh.Materials(pattern))):
-            limit = JUMP_CHANGE * values[..., :: C.dims[0] + 1].mean(axis=2).min(axis=1)
-            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
-            if len(k):
-                yield f'materials "{pattern}"', RoughElements(view, C, here[k], values[k], limit[k])
-    if all(map(numbers, problem.strain.values())):
+    if mesh.dim == 3:
         return
-    for one in features_of(problem, mesh):
-        if one.kind != "strain":
-            continue
-        e0, limit = problem.strain[one.name], JUMP_CHANGE * one.largest
-        for here, values in view.samples(e0, view.inside(mesh.Materials(one.name))):
-            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
+    view, rough = SampledElements(mesh, 2), list[tuple[str, Any, float | None]]()
+    for name, law in problem.materials.items():
+        rough += [(name, law.voigt(problem.model), None)] if varies(law) else []
+    if not all(map(numbers, problem.strain.values())):
+        strains = (one for one in features_of(problem, mesh) if one.kind == "strain")
+        rough += [(one.name, problem.strain[one.name], one.largest) for one in strains]
+    for pattern, f, largest in rough:
+        words = f'materials "{pattern}"' if largest is None else f'initial strains of "{pattern}"'
+        for here, values in view.samples(f, view.inside(mesh.Materials(pattern))):
+            size = np.full(len(here), largest)
+            if largest is None:  # the least mean of the diagonal
+                size = values[..., :: f.dims[0] + 1].mean(axis=2).min(axis=1)
+            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > JUMP_CHANGE * size)
             if len(k):
-                limits = np.full(len(k), limit)
-                found = RoughElements(view, e0, here[k], values[k], limits)
-                yield f'initial strains of "{one.name}"', found
+                yield words, RoughElements(view, f, here[k], values[k], JUMP_CHANGE * size[k])
 
 
 def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
@@ -267,12 +234,13 @@ def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
 
 def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of every law, or strain, that jumps inside elements, where it jumps most."""
-    jumps: dict[str, list[Jump]] = {}
+    jumps: dict[str, list[tuple[Array, Array]]] = {}
     for pattern, elements in _rough(problem, mesh):
         jumps.setdefault(pattern, []).extend(elements.jumps().values())
     for pattern, found in jumps.items():
         if found:
-            (x, y), low, high = max(found, key=lambda jump: jump.high - jump.low)
+            (x, y), sides = max(found, key=lambda jump: float(np.ptp(jump[1])))
+            low, high = sorted(sides)
             warn(
                 f"{pattern} jump inside {len(found)} elements, most near "
                 f"({x:.4g}, {y:.4g}): a component from {low:.3g} to {high:.3g}. No order "

@@ -5,7 +5,6 @@ from .cells import composite as composite
 from .cells import evaluations as evaluations
 from .cells import lattice as lattice
 from .cells import local_functions as local_functions
-from .features import Unresolved as Unresolved
 from .features import features_of as features_of
 from .features import unresolved as unresolved
 from .features import warn_of_unresolved as warn_of_unresolved

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask, root_of_squares
+from ..arrays import Array, Index, Mask, joined, root_of_squares, rows_of
 from ..problem import POSITION, MeshArrays, region_mask
 
 # Halvings of the sides: points beside corners of smaller parts are these.
@@ -130,17 +130,6 @@ class ElementParts:
         size = len(elements)
         return ElementParts(elements, np.zeros((size, dim)), np.tile(np.eye(dim), (size, 1, 1)))
 
-    @staticmethod
-    def joined(several: list[ElementParts]) -> ElementParts:
-        """All of several."""
-        parts = zip(*((cells.element, cells.origin, cells.side) for cells in several), strict=True)
-        return ElementParts(*map(np.concatenate, parts))
-
-    @property
-    def dim(self) -> int:
-        """Dimension of the elements."""
-        return self.origin.shape[1]
-
     def points(self, rule: Rule) -> Array:
         """Points of a rule, (k, m, dim), in reference coordinates of the elements."""
         return self.origin[:, None] + rule.points @ self.side
@@ -149,13 +138,9 @@ class ElementParts:
         """Weights of a rule, (k, m)."""
         return np.abs(np.linalg.det(self.side))[:, None] * rule.weights
 
-    def __getitem__(self, at: Mask | Index) -> ElementParts:
-        """The cells selected by `at` (k,), a mask or numbers."""
-        return ElementParts(self.element[at], self.origin[at], self.side[at])
-
     def divided(self, n: int) -> ElementParts:
         """Each in n^dim equal parts, one after the other."""
-        origin, side = parts(self.dim, n)
+        origin, side = parts(self.origin.shape[1], n)
         return ElementParts(
             np.repeat(self.element, len(origin)),
             (self.origin[:, None] + origin @ self.side).reshape(-1, *origin.shape[1:]),
@@ -187,11 +172,6 @@ class Refined:
     # is allowed of a part if any was halved, as a jump may be missed in it.
     error: Array
 
-    @property
-    def integral(self) -> Array:
-        """Over all parts, (c,)."""
-        return np.einsum("km,kmc->c", self.cells.weights(self.rule), self.values)
-
 
 def refined(
     integrand: Integrand,
@@ -208,7 +188,7 @@ def refined(
     one that is halved is halved, too, where the `corners` (n, 3, 2) of all triangles tell: it may
     hold the rest of what is there without any of the points.
     """
-    dim = cells.dim
+    dim = cells.origin.shape[1]
     rule = Rule.of(dim, *rules[dim])
     found, kept, missed, differences, errors = [], [], [], [], []
 
@@ -233,19 +213,19 @@ def refined(
         if corners is not None and some.any():
             some = cells.beside(some, corners)
         again = np.repeat(some, 2**dim)
-        found.append(halves[~again])
+        found.append(rows_of(halves, ~again))
         kept.append(values[~again])
         over = np.where(error > allowed, error, 0.0) * last / 2**dim
         missed.append(np.repeat(over, 2**dim)[~again])
         differences.append(differs[~some])
         errors.append(sizes[~some])
-        cells, coarse = halves[again], fine[again]
+        cells, coarse = rows_of(halves, again), fine[again]
         if not len(coarse):
             break
     sums = np.abs(np.concatenate(differences).sum(axis=0))
     roots = np.array([root_of_squares(column) for column in np.concatenate(errors).T])
     return Refined(
-        ElementParts.joined(found),
+        joined(found),
         rule,
         np.concatenate(kept),
         np.concatenate(missed),
@@ -397,9 +377,8 @@ class SampledElements:
         count = divisions(self.dim, self.sizes[elements], self.arrays.extent)
         count = np.maximum(count // POINTS, 2)
         several = np.unique(count).tolist()
-        return ElementParts.joined(
-            [ElementParts.whole(self.dim, elements[count == n]).divided(n) for n in several]
-        )
+        whole = (ElementParts.whole(self.dim, elements[count == n]) for n in several)
+        return joined([cells.divided(n) for cells, n in zip(whole, several, strict=True)])
 
     def integral(
         self, density: ng.CoefficientFunction, elements: Index, rough: Mask | None = None
@@ -416,9 +395,9 @@ class SampledElements:
 
         cells = ElementParts.whole(self.dim, elements[~fine])
         if fine.any():
-            cells = ElementParts.joined([cells, self.in_parts(elements[fine])])
+            cells = joined([cells, self.in_parts(elements[fine])])
         found = refined(values, cells, INTEGRALS, INTEGRAL_ERROR[self.dim], corners=self.corners)
-        return found.integral, found.error
+        return np.einsum("km,kmc->c", found.cells.weights(found.rule), found.values), found.error
 
 
 def missed_by_polynomials(values: Array, dim: int) -> Array:
@@ -431,5 +410,4 @@ def missed_by_polynomials(values: Array, dim: int) -> Array:
 def polynomials(dim: int, n: int) -> Array:
     """Values (k, q) of orthonormal polynomials at the points of a lattice, fewer than half."""
     x = 2 * lattice(dim, n) - 1
-    degree = min({1: n - 2, 2: n - 1}[dim], DEGREE)
-    return np.asarray(np.linalg.qr(monomials(x, degree))[0])
+    return np.asarray(np.linalg.qr(monomials(x, min(n - 3 + dim, DEGREE)))[0])

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, joined, rows_of
 from ..errors import warn
 from ..problem import POSITION, Problem, numbers, varies
 from .cells import ElementParts, SampledElements, lattice, sampled
@@ -84,16 +84,6 @@ class Features:
     jumps: Array  # (j, 3) of displacements: a place, and by how much; lengths
     samples: int  # at which it was looked at
     largest: float  # size of a value there
-
-    @property
-    def places(self) -> Array:
-        """Places (k, 2) of the features, lengths."""
-        return self.spots[:, :2]
-
-    @property
-    def widths(self) -> Array:
-        """Widths (k,), lengths."""
-        return self.spots[:, 2]
 
 
 NO_JUMPS = np.empty((0, 3))
@@ -470,9 +460,9 @@ def towards(features: Array, cells: ElementParts, view: SampledElements) -> Elem
         distance, nearest = tree.query(x)
         width = features[nearest, 2]
         near = (distance <= size + width) & (size > width)
-        done.append(cells[~near])
-        cells = cells[near].divided(2)
-    return ElementParts.joined(done)
+        done.append(rows_of(cells, ~near))
+        cells = rows_of(cells, near).divided(2)
+    return joined(done)
 
 
 def where_features_are(
@@ -532,36 +522,19 @@ def _odd(slope: Array, noise: float) -> Mask:
     return np.asarray((slope < low - noise) | (slope > high + noise))
 
 
-@dataclass(frozen=True, eq=False)
-class Unresolved:
-    """A function with features that are narrower than the elements they lie in."""
+def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> dict[str, Mask]:
+    """Functions whose features are narrower than a mesh shows, or `in_bounds` of the error.
 
-    kind: str  # as of `Features`
-    name: str
-    place: Array  # (2,) of the feature that is narrowest beside its element, lengths
-    width: float  # of this feature, a length
-    size: float  # of its element, a length
-    elements: Mask  # (ne,), all triangles that are too large
-
-    def __str__(self) -> str:
-        """Message of the warning."""
-        x, y = self.place
-        return (
-            f'{self.kind} "{self.name}" has a feature {self.width:.2g} wide near '
-            f"({x:.4g}, {y:.4g}), in an element of size {self.size:.2g}"
-        )
-
-
-def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> list[Unresolved]:
-    """Functions whose features are narrower than a mesh shows, or `in_bounds` of the error."""
-    limits, found = BOUND_WIDTHS if in_bounds else RESOLVED_WIDTHS, []
+    In words, with the one that is narrowest beside its element, and triangles (ne,) too large.
+    """
+    limits, found = BOUND_WIDTHS if in_bounds else RESOLVED_WIDTHS, dict[str, Mask]()
     for one in features_of(problem, mesh):
-        if one.kind not in limits or not len(one.places):
+        if one.kind not in limits or not len(one.spots):
             continue
         view = SampledElements(mesh, one.dim)
         region = mesh.Materials(one.name) if one.dim == 2 else mesh.Boundaries(one.name)
         at, feature = where_features_are(one.spots, view, view.inside(region))
-        ratio = view.sizes[at] / one.widths[feature]
+        ratio = view.sizes[at] / one.spots[feature, 2]
         large = ratio > limits[one.kind]
         if one.kind == "traction":  # straight segments are cut at features
             middle = view.positions(at, np.full((len(at), 1), 0.5))
@@ -574,9 +547,12 @@ def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> l
             ends = np.isin(view.arrays.elements, view.ends[elements])
             elements = np.asarray(ends.sum(axis=1) > 1)
         worst = int(np.argmax(np.where(large, ratio, 0.0)))
-        k = feature[worst]
-        size = view.sizes[at[worst]]
-        found.append(Unresolved(one.kind, one.name, one.places[k], one.widths[k], size, elements))
+        (x, y, width), size = one.spots[feature[worst]], view.sizes[at[worst]]
+        words = (
+            f'{one.kind} "{one.name}" has a feature {width:.2g} wide near ({x:.4g}, {y:.4g}), '
+            f"in an element of size {size:.2g}"
+        )
+        found[words] = elements | found.get(words, False)
     return found
 
 

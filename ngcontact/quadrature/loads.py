@@ -12,7 +12,7 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, power_of_two
+from ..arrays import Array, Index, Mask, power_of_two, rows_of
 from ..errors import warn
 from ..problem import MeshArrays, Problem, numbers
 from .cells import (
@@ -189,7 +189,7 @@ def beside_edges(dim: int) -> Array:
 def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.GridFunction, Array]:
     """Polynomials with the moments of a load times the measure, and what they miss of it (n,)."""
     order = np.argsort(found.cells.element, kind="stable")
-    cells, values, rule = found.cells[order], found.values[order], found.rule
+    cells, values, rule = rows_of(found.cells, order), found.values[order], found.rule
     points, weights, dim = cells.points(rule), cells.weights(rule), view.dim
     elements, first = np.unique(cells.element, return_index=True)
     moments = np.swapaxes(weights[..., None] * monomials(2 * points - 1, degree), 1, 2) @ values

@@ -125,10 +125,10 @@ def test_a_strip_is_found_with_its_place_and_width(kind, start, width):
         start = 0.05  # at an end, half a wave looks the same
     f = 3 * ng.x + box(ng.x, start, width)
     one = found(given(kind, f), kind)
-    assert len(one.places) <= 2
-    off = np.linalg.norm(one.places - [start + width / 2, 1], axis=1)
+    assert len(one.spots) <= 2
+    off = np.linalg.norm(one.spots[:, :2] - [start + width / 2, 1], axis=1)
     assert off.min() < width / 4
-    assert one.widths[off.argmin()] == pytest.approx(width, rel=0.25)  # measured: 0.2 at the end
+    assert one.spots[off.argmin(), 2] == pytest.approx(width, rel=0.25)  # measured: 0.2 at the end
 
 
 SMOOTH = [
@@ -149,7 +149,7 @@ SMOOTH = [
 @pytest.mark.parametrize("kind", ["traction", "displacement", "gap", "force"])
 @pytest.mark.parametrize("number", range(len(SMOOTH)))
 def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
-    assert not len(found(given(kind, SMOOTH[number]), kind).places)
+    assert not len(found(given(kind, SMOOTH[number]), kind).spots)
 
 
 @pytest.mark.parametrize("phase", np.linspace(0, 6, 7))
@@ -160,7 +160,7 @@ def test_circles_have_no_ends(phase):
     for side, other in (("inner_contact", "outer_contact"), ("outer_contact", "inner_contact")):
         held = {"hole": (1e-3, 0), "rim": (0, 0)}
         pair = Contact(side, other, gap=gap)
-        assert not len(found(Problem(rings(), laws, held, contact=[pair]), "gap").places)
+        assert not len(found(Problem(rings(), laws, held, contact=[pair]), "gap").spots)
 
 
 @pytest.mark.parametrize("order", [1, 3])

@@ -219,9 +219,9 @@ def force_features(problem: Problem, trace: BoundaryTrace) -> Array:
     """Largest sizes (ne,) of cells, by element, that show narrow features of forces; lengths."""
     view, found = SampledElements(trace.mesh, 2), np.full(trace.mesh.ne, np.inf)
     for one in features_of(problem, trace.mesh):
-        if one.kind == "force" and len(one.places):
+        if one.kind == "force" and len(one.spots):
             at, feature = where_features_are(one.spots, view, np.arange(trace.mesh.ne))
-            narrow = at[view.sizes[at] > one.widths[feature] / LEAST_PART]
+            narrow = at[view.sizes[at] > one.spots[feature, 2] / LEAST_PART]
             found[narrow] = view.sizes[narrow] / FINEST_PARTS
     return found
 
