@@ -6,14 +6,20 @@ Facets are surfaces (q, n, 3) given by their points at the nodes of `reference.t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import NEWTON_STEPS, Array, Index, Mask
+from ..arrays import NEWTON_STEPS, Array, Index
 from ..reference.triangle import CENTRE, lagrange, lagrange_gradient
-from .projection import GRAZING_COSINE, MATCHING_DISTANCE, PAIRS_AT_ONCE, Partners
+from .projection import (
+    GRAZING_COSINE,
+    MATCHING_DISTANCE,
+    PAIRS_AT_ONCE,
+    Partners,
+    enter,
+    none_met,
+    opposes,
+)
 
 DEGREES = {3: 1, 6: 2, 10: 3}  # by the number of nodes
 NEAREST_FACETS = 8  # facets by their middles, at which a ray is tried before all others
@@ -22,11 +28,6 @@ NEAREST_FACETS = 8  # facets by their middles, at which a ray is tried before al
 OUTSIDE_COORDINATE = 1e-7
 NEWTON_TOLERANCE = 1e-14  # change of barycentric coordinates at which Newton's method has arrived
 MISSING_CHANGE = 1e-8  # ... above which it has found no crossing in the end
-
-
-def none_met(size: int) -> Partners:
-    """Partners of points (size,) that meet nothing."""
-    return Partners(np.full(size, -1), np.tile(CENTRE, (size, 1)), np.full(size, np.inf))
 
 
 def onto(
@@ -82,46 +83,6 @@ def line_coordinates(points: Array, corners: Array, directions: Array) -> Array:
     return np.column_stack([L, 1 - L.sum(axis=1)])
 
 
-def _faces(surface: Array, side: Array, facet: Index, L: Array, directions: Array) -> Mask:
-    """Whether outward normals at `L` (k, 3) of facets `facet` (k,) oppose `directions` (k, 3)."""
-    degree = DEGREES[surface.shape[1]]
-    tangents = np.einsum("kij,kid->kdj", lagrange_gradient(degree, L), surface[facet])
-    normal = np.cross(tangents[..., 0], tangents[..., 1]) * side[facet, None]
-    across = (normal * directions).sum(axis=1)
-    return np.asarray(across < -GRAZING_COSINE * np.linalg.norm(normal, axis=1))
-
-
-@dataclass(frozen=True, eq=False)
-class _Rays:
-    """Lines through k points, and the facets that they may meet, as `cast` has them."""
-
-    points: Array  # (k, 3)
-    directions: Array  # (k, 3)
-    surface: Array  # (q, n, 3)
-    side: Array  # (q,)
-    ahead: bool  # whether only what lies ahead is met
-
-    def met(self, point: Index, facet: Index) -> tuple[Index, Partners]:
-        """Which (j,) of the pairs (r,) of `point` and `facet` meet, and where."""
-        d = self.directions[point]
-        L, distance = onto(self.points[point], d, self.surface, facet)
-        inside = np.flatnonzero(L.min(axis=1) >= -OUTSIDE_COORDINATE)
-        meets = _faces(self.surface, self.side, facet[inside], L[inside], d[inside])
-        if self.ahead:
-            meets &= distance[inside] >= -MATCHING_DISTANCE * np.abs(self.surface).max()
-        pairs = inside[meets]
-        return pairs, Partners(facet[pairs], L[pairs], distance[pairs])
-
-    def take(self, found: Partners, point: Index, facet: Index) -> None:
-        """Enter the nearest of what the pairs (r,) of `point` and `facet` meet into `found`."""
-        pairs, met = self.met(point, facet)
-        order = np.lexsort((np.abs(met.distance), point[pairs]))
-        at, first = np.unique(point[pairs[order]], return_index=True)
-        best = order[first]
-        found.segment[at], found.s[at] = met.segment[best], met.s[best]
-        found.distance[at] = met.distance[best]
-
-
 def cast(
     points: Array, directions: Array, surface: Array, side: Array, *, ahead: bool = False
 ) -> Partners:
@@ -131,15 +92,28 @@ def cast(
     (q,). Both senses count unless only points `ahead` do, so that overlapping bodies give negative
     distances.
     """
-    found = none_met(len(points))
+    found = none_met(len(points), CENTRE[0])
     if len(surface) == 0 or len(points) == 0:
         return found
+
+    def take(point: Index, facet: Index) -> None:
+        """Enter the nearest of what the pairs (r,) of `point` and `facet` meet."""
+        d = directions[point]
+        L, distance = onto(points[point], d, surface, facet)
+        at = np.flatnonzero(L.min(axis=1) >= -OUTSIDE_COORDINATE)
+        gradient = lagrange_gradient(DEGREES[surface.shape[1]], L[at])
+        tangents = np.einsum("kij,kid->jkd", gradient, surface[facet[at]])
+        meets = opposes(np.cross(*tangents) * side[facet[at], None], d[at])
+        if ahead:
+            meets &= distance[at] >= -MATCHING_DISTANCE * np.abs(surface).max()
+        at = at[meets]
+        enter(found, point[at], Partners(facet[at], L[at], distance[at]))
+
     middle = surface[:, :3].mean(axis=1)
     radius = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
     _, near = cKDTree(middle).query(points, k=min(NEAREST_FACETS, len(middle)))
     near = near.reshape(len(points), -1)
-    rays = _Rays(points, directions, surface, side, ahead)
-    rays.take(found, np.repeat(np.arange(len(points)), near.shape[1]), near.ravel())
+    take(np.repeat(np.arange(len(points)), near.shape[1]), near.ravel())
     block = max(1, PAIRS_AT_ONCE // len(middle))
     # Of the others those whose ball the line passes; a nearer one of these may hide what was met.
     for first in range(0, len(points), block):
@@ -150,5 +124,5 @@ def cast(
         square = (x**2).sum(axis=1)[:, None] - 2 * x @ middle.T + (middle**2).sum(axis=1)
         passes = square - along**2 <= radius**2 * (1 + OUTSIDE_COORDINATE)
         at, facet = np.nonzero(passes)
-        rays.take(found, here[at], facet)
+        take(here[at], facet)
     return found

@@ -19,7 +19,7 @@ from ..problem import Contact
 from ..reference import triangle
 from . import casting, clipping, projection
 from .line import ContactLine
-from .projection import MATCHING_DISTANCE, NEWTON_TOLERANCE, Partners, coincident, crossings, feet
+from .projection import MATCHING_DISTANCE, NEWTON_TOLERANCE, Partners, coincident, none_met
 
 FACING_COSINE = 1e-8  # cosine between normal and direction from which a point faces the other body
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
@@ -62,8 +62,7 @@ def partners(
     The points lie on the segments `own` (k,); `directions` (k, d) are unit vectors towards the
     facing body. Some `nodes` may lie at others. None is met on a rigid obstacle.
     """
-    by_dimension = projection if trace.model.dim == 2 else casting
-    found = by_dimension.none_met(len(points))
+    found = none_met(len(points), trace.vertices[0])
     if facing.size == 0:
         return found
     if nodes:
@@ -76,7 +75,8 @@ def partners(
         found.distance[same] = ((places[node] - points[same]) * directions[same]).sum(axis=1)
     rest = np.flatnonzero(found.segment < 0)
     if rest.size:
-        x, d, cast = points[rest], directions[rest], by_dimension.cast
+        x, d = points[rest], directions[rest]
+        cast = projection.cast if trace.model.dim == 2 else casting.cast
         other = cast(x, d, trace.curve[facing], trace.side[facing])
         # Overlap puts a partner behind the point, inside the own body; one that the backward ray
         # meets only after it has left that body belongs to a far side.
@@ -127,7 +127,7 @@ def opposite(
         lost = ~np.isfinite(np.column_stack([there, distance])).all(axis=1)
         there[lost], distance[lost] = near[lost], np.nan
         return there, distance
-    s = crossings(points, across(directions), trace.curve, facing, near, settled)
+    s = projection.crossings(points, across(directions), trace.curve, facing, near, settled)
     return s, ((at(trace.curve, facing, s) - points) * directions).sum(axis=1)
 
 
@@ -181,7 +181,7 @@ def divided(
     _, first = np.unique(ends, return_index=True)
     x = trace.curve[facing][:, [0, -1]].reshape(-1, 2)[first]
     xi = None if contact.direction is None else np.array(contact.direction)
-    passing, s = feet(x, trace.curve[segments], xi)
+    passing, s = projection.feet(x, trace.curve[segments], xi)
     local = np.concatenate([passing, np.arange(k), np.arange(k)])
     cut = np.concatenate([s, np.zeros(k), np.ones(k)])
     order = np.lexsort((cut, local))

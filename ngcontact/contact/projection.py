@@ -34,9 +34,27 @@ class Partners:
     searched: bool = False  # False where all are nodes at the same place
 
 
-def none_met(size: int) -> Partners:
-    """Partners of points (size,) that meet nothing."""
-    return Partners(np.full(size, -1), np.zeros(size), np.full(size, np.inf))
+def none_met(size: int, place: Array) -> Partners:
+    """Partners of points (size,) that meet nothing, with any parameter `place` (...)."""
+    return Partners(np.full(size, -1), place[None].repeat(size, axis=0), np.full(size, np.inf))
+
+
+def enter(found: Partners, point: Index, met: Partners) -> None:
+    """Let `found` be the nearest of the partners `met` (r,) of each `point` (r,)."""
+    order = np.lexsort((np.abs(met.distance), point))
+    at, first = np.unique(point[order], return_index=True)
+    best = order[first]
+    found.segment[at], found.s[at] = met.segment[best], met.s[best]
+    found.distance[at] = met.distance[best]
+
+
+def opposes(normals: Array, directions: Array) -> Mask:
+    """Whether outward `normals` (k, d) oppose unit vectors `directions` (k, d).
+
+    A ray along a straight boundary, such as a symmetry plane, does not meet it.
+    """
+    grazing = GRAZING_COSINE * np.linalg.norm(normals, axis=1)  # round-off must not decide
+    return np.asarray((normals * directions).sum(axis=1) < -grazing)
 
 
 def _bend(curve: Array) -> tuple[Array, Array]:
@@ -121,7 +139,7 @@ def cast(
     senses count unless only points `ahead` do, so that overlapping bodies give negative distances;
     parameters within `MATCHING_DISTANCE` of an end are that end.
     """
-    found = none_met(len(points))
+    found = none_met(len(points), np.zeros(()))
     if len(curve) == 0 or len(points) == 0:
         return found
     t = across(directions)
@@ -131,27 +149,13 @@ def cast(
     offset = at(curve, segment, s) - points[point]
     length = MATCHING_DISTANCE * np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
     distance = (offset * directions[point]).sum(axis=1)
-    meets = _faces(curve, side, segment, s, directions[point])
+    normals = -across(slope(curve, segment, s)) * side[segment, None]
+    meets = opposes(normals, directions[point])
     meets &= np.abs((offset * t[point]).sum(axis=1)) <= 2 * length
     if ahead:
         meets &= distance >= -length
-    order = np.flatnonzero(meets)
-    order = order[np.lexsort((np.abs(distance[order]), point[order]))]  # by point, nearest first
-    _, first = np.unique(point[order], return_index=True)
-    best = order[first]
-    found.segment[point[best]], found.s[point[best]] = segment[best], s[best]
-    found.distance[point[best]] = distance[best]
+    enter(found, point[meets], Partners(segment[meets], s[meets], distance[meets]))
     return found
-
-
-def _faces(curve: Array, side: Array, segment: Index, s: Array, directions: Array) -> Mask:
-    """Whether outward normals at `s` (k,) of segments `segment` (k,) oppose `directions` (k, 2).
-
-    A ray along a straight boundary, such as a symmetry plane, does not meet it.
-    """
-    normal = -across(slope(curve, segment, s)) * side[segment, None]
-    grazing = GRAZING_COSINE * np.linalg.norm(normal, axis=1)  # round-off must not decide
-    return np.asarray((normal * directions).sum(axis=1) < -grazing)
 
 
 def coincident(
@@ -171,7 +175,7 @@ def coincident(
     )
     point, column = np.isfinite(distances).nonzero()
     place = numbers[point, column]
-    meets = (normals[place] * directions[point]).sum(axis=1) < -GRAZING_COSINE
+    meets = opposes(normals[place], directions[point])
     meets &= distances[point, column] <= reach[place]
     # The nearest one is entered last.
     found[point[meets][::-1]] = place[meets][::-1]

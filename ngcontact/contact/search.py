@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -81,24 +80,26 @@ def find_contacts(geometry: OCCGeometry | ng.Mesh, *, within: float) -> list[Fou
     check_mesh(mesh, 2)
     trace = boundary_trace(curve(mesh, CURVED, "isoparametric")[0], 1)
     seen = {pair: _least(trace, *facing) for pair, facing in _facing(trace, reach).items()}
-    near = {pair: place for pair, place in seen.items() if abs(place.gap) <= reach}
+    near = {pair: found for pair, found in seen.items() if abs(found[0]) <= reach}
     found = []
     for pair in dict.fromkeys(min(pair, pair[::-1]) for pair in near):
-        places = [near[sides] for sides in (pair, pair[::-1]) if sides in near]
-        x, y = places[0].point
+        known = [sides for sides in (pair, pair[::-1]) if sides in near]
         if pair[0] == pair[1] or {"", "default"} & set(pair):
+            x, y = near[known[0]][1]
             raise ValueError(
                 f'boundaries "{pair[0]}" and "{pair[1]}" of two bodies face each other near '
                 f"({x:.6g}, {y:.6g}): give both sides names of their own"
             )
         one, other = map(re.escape, pair)
-        one, other = with_roles(trace, Contact(one, other, roles="auto")).sides
-        own = next((place for place in places if re.escape(place.name) == one), places[0])
-        found.append(FoundContact(one, other, least_gap=own.gap, place=own.point))
+        roles = with_roles(trace, Contact(one, other, roles="auto"))
+        own = next((sides for sides in known if re.escape(sides[0]) == roles.secondary), known[0])
+        gap, place = near[own]
+        found.append(FoundContact(roles.secondary, roles.primary, least_gap=gap, place=place))
     if not found:
-        pair_gap = min(((abs(p.gap), *pair) for pair, p in seen.items()), default=None)
-        gap, one, other = pair_gap or (0.0, "", "")
-        nearest = f'; "{one}" is {gap:.4g} apart from "{other}"' if pair_gap else ""
+        nearest = ""
+        if seen:
+            gap, one, other = min((abs(gap), *pair) for pair, (gap, _) in seen.items())
+            nearest = f'; "{one}" is {gap:.4g} apart from "{other}"'
         warn(
             f"no boundaries of different bodies face each other within {within:g}{nearest}; bodies "
             "with common vertices are one (join them by Compound, not Glue)"
@@ -106,23 +107,13 @@ def find_contacts(geometry: OCCGeometry | ng.Mesh, *, within: float) -> list[Fou
     return found
 
 
-class _Place(NamedTuple):
-    """Place at which a gap is least."""
-
-    name: str  # of the boundary it is measured from
-    gap: float
-    point: tuple[float, float]
-
-
-# Samples of a boundary that face another: segments (k,) and parameters (k,) there, and the segments
-# (q,) of the other body.
-_Samples = tuple[Index, Array, Index]
-
-
-def _facing(trace: BoundaryTrace, within: float) -> dict[tuple[str, str], _Samples]:
+def _facing(
+    trace: BoundaryTrace, within: float
+) -> dict[tuple[str, str], tuple[Index, float, Index]]:
     """The sample with the least gap, by the names of both sides, each as the first in turn.
 
-    Of connected bodies whose boxes are so near.
+    Its segment (1,) and parameter, and the segments (q,) of the other body beside it. Of connected
+    bodies whose boxes are so near.
     """
     outer = np.flatnonzero(~trace.inner)
     names = np.array(trace.mesh.GetBoundaries())[trace.region]
@@ -131,11 +122,10 @@ def _facing(trace: BoundaryTrace, within: float) -> dict[tuple[str, str], _Sampl
     curves = [trace.curve[part].reshape(-1, 2) for part in parts]
     boxes = np.array([(x.min(axis=0), x.max(axis=0)) for x in curves])
     reach = within + np.array([trace.lengths(part).max() for part in parts]) / len(PLACES)
-    found: dict[tuple[str, str], _Samples] = {}
+    found: dict[tuple[str, str], tuple[Index, float, Index]] = {}
     for a, b in itertools.permutations(range(len(parts)), 2):
-        if (
-            np.maximum(boxes[a, 0], boxes[b, 0]) > np.minimum(boxes[a, 1], boxes[b, 1]) + reach[b]
-        ).any():
+        low, high = boxes[[a, b], 0].max(axis=0), boxes[[a, b], 1].min(axis=0)
+        if (low > high + reach[b]).any():
             continue
         segment, s = trace.at_places(parts[a], PLACES)
         points = trace.point(segment, s)
@@ -147,12 +137,10 @@ def _facing(trace: BoundaryTrace, within: float) -> dict[tuple[str, str], _Sampl
             at = some[k]
             pair = str(names[segment[at]]), str(names[facing[k]])
             if pair not in found:
-                middle = trace.curve[parts[b]].mean(axis=1)
-                size = (
-                    np.abs(gap[k]) + trace.lengths(segment[at : at + 1]) + trace.lengths(parts[b])
-                )
+                own, middle = segment[[at]], trace.curve[parts[b]].mean(axis=1)
+                size = np.abs(gap[k]) + trace.lengths(own) + trace.lengths(parts[b])
                 beside = np.linalg.norm(middle - points[at], axis=1) <= size
-                found[pair] = segment[at : at + 1], s[at : at + 1], parts[b][beside]
+                found[pair] = own, float(s[at]), parts[b][beside]
     return found
 
 
@@ -170,14 +158,15 @@ def _gaps(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> tuple
     return met.distance, met.segment
 
 
-def _least(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> _Place:
-    """The least gap near a sample, on its segment (1,)."""
-    width, at, steps = 2 * PLACES[0], float(s[0]), np.linspace(-1, 1, 9)
+def _least(
+    trace: BoundaryTrace, segment: Index, at: float, other: Index
+) -> tuple[float, tuple[float, float]]:
+    """The least gap near a sample, on its segment (1,), and where it is."""
+    width, steps = 2 * PLACES[0], np.linspace(-1, 1, 9)
     for _ in range(SEARCH_ROUNDS):
         s = np.unique(np.clip(at + width * steps, 0, 1))
         gap, _ = _gaps(trace, np.repeat(segment, len(s)), s, other)
         k = int(np.abs(gap).argmin())
         at, width = float(s[k]), width / 4
     x, y = trace.point(segment, np.array([at]))[0].tolist()
-    name = trace.mesh.GetBoundaries()[trace.region[segment[0]]]
-    return _Place(name, float(gap[k]), (x, y))
+    return float(gap[k]), (x, y)
