@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from operator import attrgetter
+from types import SimpleNamespace
 from typing import Any
 
 import ngsolve as ng
@@ -66,28 +67,14 @@ MIN_EXPONENT, MAX_EXPONENT = -306, 305
 MIN_REFINED = 0.7  # share of the unknowns that must be gone in the coarsest space
 
 
-@dataclass
-class MultigridUse:
-    """Sizes from which multigrid takes the place of a factorisation.
-
-    Attributes
-    ----------
-    large : dict of int to int
-        Unknowns by order from which it is the faster one, on one thread: at 80 000 of orders 1
-        and 2 both take the same time, of order 3 at a million; it always takes less memory. See
-        docs/performance.md.
-    large_solids : dict of int to int
-        The same of solids, whose factors fill up sooner.
-    coarsest : int
-        Unknowns up to which there is no coarser space, and a problem is factorised anyway.
-    """
-
-    large: dict[int, int] = field(default_factory=lambda: {1: 100_000, 2: 100_000})
-    large_solids: dict[int, int] = field(default_factory=lambda: dict.fromkeys((1, 2, 3), 25_000))
-    coarsest: int = COARSEST
-
-
-MULTIGRID = MultigridUse()  # measurements and tests change it
+# Sizes from which multigrid takes the place of a factorisation; measurements and tests change them.
+MULTIGRID = SimpleNamespace(
+    # Unknowns by order from which it is the faster one, on one thread: at 80 000 of orders 1 and 2
+    # both take the same time, of order 3 at a million; it always takes less memory.
+    large={1: 100_000, 2: 100_000},
+    large_solids=dict.fromkeys((1, 2, 3), 25_000),  # whose factors fill up sooner
+    coarsest=COARSEST,  # unknowns up to which a problem is factorised anyway
+)
 
 
 def linear_systems(
@@ -187,7 +174,7 @@ def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
         trace.model is old.model
         and trace.same_nodes(old)
         and np.array_equal(trace.curve, old.curve)
-        and np.array_equal(trace.arrays.vertices, space.vertices)
+        and np.array_equal(trace.arrays.vertices, old.arrays.vertices)
     )
 
 
@@ -232,28 +219,20 @@ def contact_lines(
     def held(line: ContactLine) -> Mask:
         return held_rows(conditions, contact_rows([line], trace), np.abs(trace.curve).max())
 
-    alike, lines = attrgetter("direction", "bilateral", "rows", "roles"), list[ContactLine]()
+    sides, others = ("secondary", "primary"), ("direction", "bilateral", "rows", "roles", "gap")
+    alike, same, lines = attrgetter(*others), attrgetter(*sides, *others), list[ContactLine]()
     for number, contact in enumerate(problem.contact):
         taken, facing = [np.zeros(0, dtype=np.intp)], trace.segments(contact.primary)
         for earlier, line in zip(problem.contact[:number], lines, strict=True):
-            if (alike(earlier), earlier.gap) != (alike(contact), contact.gap):
+            if alike(earlier) != alike(contact):
                 continue
             if earlier.primary == contact.primary:
                 taken.append(line.segments)
             elif np.intersect1d(line.facing, facing).size:
                 taken.append(line.segments[line.faces])
         own = np.intersect1d(np.concatenate(taken), trace.segments(contact.secondary))
-        sides = contact.secondary, contact.primary
-        same = (
-            line
-            for line in known
-            if (line.contact.secondary, line.contact.primary) == sides
-            and alike(line.contact) == alike(contact)
-            and line.contact.gap is None  # functions may have changed unseen
-            and contact.gap is None
-        )
-        found = None if own.size else next(same, None)
-        if found is None:
+        found = next((line for line in known if same(line.contact) == same(contact)), None)
+        if found is None or own.size or contact.gap is not None:  # that may have changed unseen
             in_space = trace.model.dim == 3  # of lines only two ends can be held
             lines.append(contact_line(trace, contact, own, held if in_space else None))
         else:
@@ -309,15 +288,14 @@ def discretise(
     rigid, f = equilibrium(problem, space, conditions, rows, basis, admissible.around)  # Remark 3.7
     space = replace(space, f=f)
     T = space.basis @ basis.T
+    b = T.T @ space.condensed(space.right_side)
     same_unknowns = previous is not None and same_basis(basis, previous.basis)
     if previous is not None and same_unknowns and np.array_equal(nodal, previous.space.nodal):
-        program = _program(
-            T.T @ space.condensed(space.right_side), admissible, rigid, previous.program.K
-        )
+        program = _program(b, admissible, rigid, previous.program.K)
         systems = previous.systems
     else:
         K, matrix = congruent(space.matrix, space.A, T)
-        program = _program(T.T @ space.condensed(space.right_side), admissible, rigid, K)
+        program = _program(b, admissible, rigid, K)
         systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
         problem=problem,

@@ -53,7 +53,6 @@ class Space:
     inner: Mask  # (2N,)
     f: Array  # (2N,), load
     initial: Array | None  # (2N,), what initial strains add to that, if there are any
-    vertices: Array  # (nv, 2), where those of the mesh were
 
     @property
     def right_side(self) -> Array:
@@ -108,12 +107,11 @@ class Space:
 
     def require_mesh(self) -> None:
         """Raise a RuntimeError where the mesh was changed in place, so that no data fit it."""
-        here = MeshArrays(self.V.mesh).vertices
-        if not np.array_equal(here, self.vertices):
-            same = len(here) == len(self.vertices)
-            moved = "other places of them" if same else f"{len(here)} now"
+        here, then = MeshArrays(self.V.mesh).vertices, self.trace.arrays.vertices
+        if not np.array_equal(here, then):
+            moved = "other places of them" if len(here) == len(then) else f"{len(here)} now"
             raise RuntimeError(
-                f"the mesh was changed after solving: {len(self.vertices)} vertices then, {moved}; "
+                f"the mesh was changed after solving: {len(then)} vertices then, {moved}; "
                 "solve again, or refine a copy, ngsolve.Mesh(mesh.ngmesh.Copy())"
             )
 
@@ -237,7 +235,6 @@ def assemble(
         inner=(np.diff(A.indptr) == 0) & condense,
         f=load_vector(problem, V, LOAD_BONUS),
         initial=initial_load(problem, V, trace),
-        vertices=trace.arrays.vertices,
     )
 
 
