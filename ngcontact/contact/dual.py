@@ -277,8 +277,7 @@ def with_dual_rows(
     if isinstance(trace, FacetTrace):  # where forces act, so that moments balance
         place = np.zeros((coupling.shape[1], 3))
         place[trace.nodes[segments]] = trace.positions(segments)
-        if trace.bernstein.any():
-            position = np.where(trace.bernstein[line.node, None], place[line.node], position)
+        position = np.where(trace.bernstein[line.node, None], place[line.node], position)
         if fixed.any():
             position = position - mean @ passed @ place
     line = replace(

@@ -9,7 +9,7 @@ points, so that every condition at a node concerns the two unknowns of that node
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
@@ -167,6 +167,8 @@ class BoundaryTrace:
     model: Model  # with the measure of segments
     axis: Index  # (k,), -1 or 1 where s = 0 or s = 1 alone lies on the axis of revolution, else 0
     on_axis: Mask  # (k,), segments that lie on it
+    _guides: dict[str, tuple[Index, Array]] = field(default_factory=dict, init=False)
+    _masks: dict[str, Mask] = field(default_factory=dict, init=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from the mesh: lines of a drawing cannot be pickled."""
@@ -218,10 +220,6 @@ class BoundaryTrace:
             normals[here] = np.where(outward[:, None], exact, -exact)
         return normals
 
-    @cached_property
-    def _guides(self) -> dict[str, tuple[Index, Array]]:
-        return {}
-
     def guide(self, pattern: str) -> tuple[Index, Array]:
         """Numbers (n,) of points at nodes of a pattern, and their exact normals (m, 2); kept."""
         if pattern not in self._guides:
@@ -249,7 +247,8 @@ class BoundaryTrace:
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
-        return segments.repeat(self.order + 1), self.places(segments).ravel()
+        s = self.places(segments)
+        return segments.repeat(s.shape[1]), s.reshape(-1, *s.shape[2:])
 
     def at_places(self, segments: Index, s: Array) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of the places `s` (g,) on each of `segments` (k,), in order."""
@@ -352,10 +351,6 @@ class BoundaryTrace:
         if len(chosen) == 1:
             return chosen[0][segment]
         return np.any([np.zeros(len(self.region), dtype=bool), *chosen], axis=0)[segment]
-
-    @cached_property
-    def _masks(self) -> dict[str, Mask]:
-        return {}
 
     def segments(self, *patterns: str | None) -> Index:
         """Segments (j,) of the boundaries that the patterns select, as in `lies_on`."""

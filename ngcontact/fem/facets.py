@@ -9,7 +9,7 @@ are B c, of functions that are nowhere negative.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -39,11 +39,10 @@ class FacetTrace(BoundaryTrace):
 
     corners: ClassVar[list[int]] = [0, 1, 2]
     vertices: ClassVar[Array] = np.eye(3)  # (3, 3)
-    # (n,), nodes whose unknown is a Bernstein coefficient; none when left out
-    bernstein: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    bernstein: Mask  # (n,), nodes whose unknown is a Bernstein coefficient
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self.mesh, self.order, self.bernstein)
+        return facet_trace, (self.mesh, self.order, self.bernstein)
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 3) of the mesh's surface at `s` (k, 3) of facets `segment` (k,)."""
@@ -87,10 +86,6 @@ class FacetTrace(BoundaryTrace):
         middle = np.tile(triangle.CENTRE, (len(segment), 1))
         return beyond_faces(self.mesh, segment, points, self.normal(segment, middle))
 
-    def at_nodes(self, segments: Index) -> tuple[Index, Array]:
-        """Facet (n,) and s (n, 3) of all nodes of `segments` (k,), one facet after the other."""
-        return self.at_places(segments, triangle.nodes(self.order))
-
     def same_nodes(self, other: BoundaryTrace) -> bool:
         """Whether the nodes are those of another trace, with the same unknowns."""
         same = isinstance(other, FacetTrace) and np.array_equal(self.bernstein, other.bernstein)
@@ -100,9 +95,7 @@ class FacetTrace(BoundaryTrace):
         """Barycentric coordinates (k, q, 3) of the nodes of `segments` (k,)."""
         return np.broadcast_to(triangle.nodes(self.order), (len(segments), self.nodes.shape[1], 3))
 
-    def barycentric(self, segments: Index) -> Array:
-        """The same (k, q, 3) of the nodes of `segments` (k,)."""
-        return self.places(segments)
+    barycentric = places
 
     def shapes(self, segment: Index, s: Array) -> Array:
         """Functions (k, q) of the unknowns at the nodes, at `s` (k, 3) of `segment` (k,)."""
@@ -120,10 +113,9 @@ class FacetTrace(BoundaryTrace):
         carries = super().weighs(segments)
         if self.order == 2:
             carries[:, :3] = False
-            if self.bernstein.any():
-                chosen = self.bernstein[self.nodes[segments]]
-                for ends, [inner] in zip(triangle.EDGES, triangle.edge_nodes(2), strict=True):
-                    carries[:, ends] |= chosen[:, [inner]]
+            chosen = self.bernstein[self.nodes[segments]]
+            for ends, [inner] in zip(triangle.EDGES, triangle.edge_nodes(2), strict=True):
+                carries[:, ends] |= chosen[:, [inner]]
         return carries
 
     def values_of_unknowns(self, segments: Index) -> Array:
@@ -236,8 +228,11 @@ class FacetTrace(BoundaryTrace):
         return values
 
 
-def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
-    """Trace of the displacements of degree `order` on the boundary of a mesh of solids."""
+def facet_trace(mesh: ng.Mesh, order: int, bernstein: Mask | None = None) -> FacetTrace:
+    """Trace of the displacements of degree `order` on the boundary of a mesh of solids.
+
+    With `bernstein` coefficients at nodes (n,), none when left out.
+    """
     view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
     vertices = view.facets
     degree = max(1, mesh.GetCurveOrder())
@@ -268,6 +263,7 @@ def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
         model=SOLID_MODEL,
         axis=zeros,
         on_axis=zeros > 0,
+        bernstein=np.zeros(space.ndof, dtype=bool) if bernstein is None else bernstein,
     )
     return trace if order == 1 else replace(trace, nodes=_nodes(trace, vertices))
 
@@ -286,7 +282,3 @@ def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryT
     if mesh.dim == 3:
         return facet_trace(mesh, order)
     return segment_trace(mesh, order, model)
-
-
-def _restored(mesh: ng.Mesh, order: int, bernstein: Mask) -> FacetTrace:
-    return replace(facet_trace(mesh, order), bernstein=bernstein)
