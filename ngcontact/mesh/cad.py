@@ -18,7 +18,6 @@ from ..arrays import Array, across, newton, rightward
 SAMPLES = 65  # points of an edge from which a projection starts
 LEVEL_DISTANCE = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
 STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
-LONG_ARC = 0.5  # parameters from which an arc of an ellipse is fitted
 # Distance, relative to coordinates and axes, up to which a formula is its curve: their round-off.
 FORMULA_DISTANCE = 8 * np.finfo(float).eps
 NEWTON_TOLERANCE = 1e-15  # relative change of a parameter at which Newton's method has arrived
@@ -28,73 +27,48 @@ class CadEdge:
     """One CAD edge as a parametrised plane curve."""
 
     def __init__(self, edge: TopoDS_Shape) -> None:
-        self._edge = edge
+        self._edge, self.name = edge, edge.name or ""  # of the boundary
         self.start, self.stop = edge.parameter_interval
         self._t = np.linspace(self.start, self.stop, SAMPLES)
         self._middle = (self.start + self.stop) / 2
-        self.straight = False  # a straight segment with a constant derivative, as far as is known
-        self._axes: Array | None = None
-        self.circle = False  # an arc of a circle, as far as is known
-        self._x = self.point(self._t)
-        self.size = float(np.abs(np.ptp(self._x, axis=0)).max())  # its extent, a length
-        chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
-        self.straight = bool(np.abs(self._x - chord).max() <= STRAIGHT * self.size)
-        self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= LEVEL_DISTANCE * self.size)
-        if not self.straight:
-            self._axes = self._fitted()
-
-    def _fitted(self) -> Array | None:
-        """Rows (3, 2) c, a, b of x = c + a cos s + b sin s, s = t less the middle, on arcs.
-
-        Of circles, by the place and the slope in the middle, and of ellipses.
-        """
-        s = self._t - self._middle
-        shapes = np.column_stack([np.cos(s), np.sin(s)])
-
-        def exact(centre: Array, axes: Array) -> bool:
-            miss = np.abs(centre + shapes @ axes - self._x).max()
-            size = np.abs(self._x).max() + np.abs(axes).max()
-            return bool(miss <= FORMULA_DISTANCE * size)
-
-        x, [slope] = self._x[SAMPLES // 2], self.derivative(self._t[[SAMPLES // 2]])
-        radius = across(slope)
-        radius *= np.sign(radius @ (x - self._x[0]))  # outwards
-        axes = np.stack([radius, slope])
-        self.circle = exact(x - radius, axes)
-        if self.circle:
-            return np.vstack([x - radius, axes])
-        if abs(self.stop - self.start) < LONG_ARC:  # cosines and sines would lose digits
-            return None
-        two = [0, int(np.abs(np.sin(s - s[0])).argmax())]  # as perpendicular as can be
-        slopes = np.column_stack([-shapes[two, 1], shapes[two, 0]])
-        axes = np.linalg.solve(slopes, self.derivative(self._t[two]))
-        centre = (self._x - shapes @ axes)[two].mean(axis=0)
-        return np.vstack([centre, axes]) if exact(centre, axes) else None
-
-    @property
-    def name(self) -> str:
-        """Boundary name."""
-        return self._edge.name or ""
+        # Whether it is a straight segment with a constant derivative, or an arc of a circle.
+        self.straight = self.circle = False
+        self.samples = self.point(self._t)  # points (n, 2) along it
+        self.size = float(np.abs(np.ptp(self.samples, axis=0)).max())  # its extent, a length
+        first, last = self.samples[[0, -1]]
+        chord = first + np.linspace(0, 1, SAMPLES)[:, None] * (last - first)
+        self.straight = bool(np.abs(self.samples - chord).max() <= STRAIGHT * self.size)
+        self.closed = bool(np.abs(last - first).max() <= LEVEL_DISTANCE * self.size)
+        if not self.straight:  # of an arc, by the place and the slope in the middle
+            x, [slope] = self.samples[SAMPLES // 2], self.derivative(self._t[[SAMPLES // 2]])
+            radius = across(slope)
+            radius *= np.sign(radius @ (x - first))  # outwards
+            self._centre, self._axes, samples = x - radius, np.stack([radius, slope]), self.samples
+            size = np.abs(samples).max() + np.abs(self._axes).max()
+            self.circle = True
+            self.circle = bool(
+                np.abs(self.point(self._t) - samples).max() <= FORMULA_DISTANCE * size
+            )
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""
         if self.straight:  # without a call for every point
             share = (np.asarray(t) - self.start) / (self.stop - self.start)
-            return self._x[0] + share[:, None] * (self._x[-1] - self._x[0])
-        if self._axes is not None:
+            return self.samples[0] + share[:, None] * (self.samples[-1] - self.samples[0])
+        if self.circle:
             s = np.asarray(t) - self._middle
-            return self._axes[0] + np.column_stack([np.cos(s), np.sin(s)]) @ self._axes[1:]
+            return self._centre + np.column_stack([np.cos(s), np.sin(s)]) @ self._axes
         values = (self._edge.Value(float(ti)) for ti in t)
         return np.array([(p.x, p.y) for p in values]).reshape(-1, 2)
 
     def derivative(self, t: Array) -> Array:
         """Derivatives (k, 2) with respect to the parameter, at `t` (k,)."""
         if self.straight:
-            slope = (self._x[[-1]] - self._x[[0]]) / (self.stop - self.start)
+            slope = (self.samples[[-1]] - self.samples[[0]]) / (self.stop - self.start)
             return slope.repeat(len(t), axis=0)
-        if self._axes is not None:
+        if self.circle:
             s = np.asarray(t) - self._middle
-            return np.column_stack([-np.sin(s), np.cos(s)]) @ self._axes[1:]
+            return np.column_stack([-np.sin(s), np.cos(s)]) @ self._axes
         values = (self._edge.Tangent(float(ti)) for ti in t)
         return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
 
@@ -106,15 +80,14 @@ class CadEdge:
     def project(self, points: Array) -> Array:
         """Parameters (k,) of the closest points of the edge to `points` (k, 2) near it."""
         if self.straight:
-            along = self._x[-1] - self._x[0]
-            s = (points - self._x[0]) @ along / (along @ along)
+            along = self.samples[-1] - self.samples[0]
+            s = (points - self.samples[0]) @ along / (along @ along)
             return self.start + np.clip(s, 0, 1) * (self.stop - self.start)
-        if self._axes is not None and self.circle:
-            centre, a, b = self._axes
-            offset = points - centre
-            s = np.arctan2(offset @ b, offset @ a)
+        if self.circle:
+            a, b = self._axes @ (points - self._centre).T
+            s = np.arctan2(b, a)
             return np.minimum(np.maximum(self._middle + s, self.start), self.stop)
-        nearest = ((points[:, None] - self._x) ** 2).sum(axis=2).argmin(axis=1)
+        nearest = ((points[:, None] - self.samples) ** 2).sum(axis=2).argmin(axis=1)
 
         def step(t: Array) -> Array:
             tangent = self.derivative(t)
@@ -158,11 +131,6 @@ class CadEdge:
         """
         beside = across(normals)
         return self.level(beside, (points * beside).sum(axis=1), points)
-
-    @property
-    def samples(self) -> Array:
-        """Points (n, 2) along the edge."""
-        return self._x
 
 
 @lru_cache(maxsize=1)  # for all meshes of one adaptive run
