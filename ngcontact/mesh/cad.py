@@ -84,8 +84,8 @@ class CadEdge:
             s = (points - self.samples[0]) @ along / (along @ along)
             return self.start + np.clip(s, 0, 1) * (self.stop - self.start)
         if self.circle:
-            a, b = self._axes @ (points - self._centre).T
-            s = np.arctan2(b, a)
+            offset = points - self._centre
+            s = np.arctan2(offset @ self._axes[1], offset @ self._axes[0])
             return np.minimum(np.maximum(self._middle + s, self.start), self.stop)
         nearest = ((points[:, None] - self.samples) ** 2).sum(axis=2).argmin(axis=1)
 

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.meshing import IdentificationType
 
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Integers
 from ..problem import PIECES, POSITION, MeshArrays
 from .cad import CadEdge, cad_edges
 from .faces import curved_facets
@@ -99,14 +99,6 @@ def _straightened(mesh: ng.Mesh) -> bool:
     return bool(missed > CURVE_DISTANCE**2 * size)
 
 
-def _on_curves(mesh: ng.Mesh) -> Mask | None:
-    """Segments (k,) of curved CAD edges; None without CAD."""
-    if (edges := cad_edges(mesh)) is None:
-        return None
-    curved = np.array([not edge.straight for edge in edges])[MeshArrays(mesh).boundaries]
-    return np.asarray(curved)
-
-
 def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     """Mesh curved to the element's degree, and the number of elements at curved edges or faces.
 
@@ -121,9 +113,11 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
         if before > 1:
             mesh.Curve(before)
     degree = order if element == "isoparametric" else order + 1  # (2.8)
-    curved = _on_curves(mesh) if mesh.dim == 2 else curved_facets(mesh)
-    if curved is None:
-        return mesh, 0
+    if mesh.dim == 3:
+        curved = curved_facets(mesh)
+    else:
+        bent = [k for k, edge in enumerate(cad_edges(mesh) or ()) if not edge.straight]
+        curved = np.isin(MeshArrays(mesh).boundaries, bent)
     count = int(np.count_nonzero(curved))
     if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count

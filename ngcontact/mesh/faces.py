@@ -110,10 +110,8 @@ def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Arr
         yield face, at, uv[facets[at]], face.plane(uv[region == number].reshape(-1, 2))
 
 
-def curved_facets(mesh: ng.Mesh) -> Mask | None:
-    """Facets (k,) of curved CAD faces; None without CAD."""
-    if cad_faces(mesh) is None:
-        return None
+def curved_facets(mesh: ng.Mesh) -> Mask:
+    """Facets (k,) of curved CAD faces."""
     curved = np.zeros(mesh.GetNE(ng.BND), dtype=bool)
     for _, at, _, plane in _by_face(mesh, np.arange(len(curved))):
         curved[at] = plane is None

@@ -184,23 +184,19 @@ def _nearest_crossing(samples: Array, x: Array, along: Array) -> Array:
     return points[np.arange(len(x)), best]
 
 
-def _at_least(x: Array, edge: CadEdge) -> Array:
-    """A distance (k,) of points `x` (k, 2) from a curve that is no more than the true one.
-
-    That from the box of its samples, which it leaves by no more than the way between two of them.
-    """
-    step = chords(edge.samples).max()
-    low, high = edge.samples.min(axis=0) - step, edge.samples.max(axis=0) + step
-    return np.linalg.norm(np.maximum(np.maximum(low - x, x - high), 0.0), axis=1)
-
-
 def _near(secondary: CadEdge, facing: list[Edge]) -> list[Edge]:
     """The edges of `facing` that may be the nearest to some point of a curve."""
-    x = secondary.samples
-    step = chords(x).max()
-    samples = np.concatenate([edge.curve.samples for edge in facing])
-    reach = cKDTree(samples).query(x)[0] + 2 * step  # more than the distance at any point
-    return [edge for edge in facing if (_at_least(x, edge.curve) <= reach).any()]
+    x, found = secondary.samples, []
+    samples = [edge.curve.samples for edge in facing]
+    reach = cKDTree(np.concatenate(samples)).query(x)[0]
+    reach += 2 * chords(x).max()  # more than the distance at any point
+    for edge, there in zip(facing, samples, strict=True):
+        step = chords(there).max()  # a curve leaves the box of its samples by no more
+        low, high = there.min(axis=0) - step, there.max(axis=0) + step
+        apart = np.linalg.norm(np.maximum(np.maximum(low - x, x - high), 0.0), axis=1)
+        if (apart <= reach).any():
+            found.append(edge)
+    return found
 
 
 def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
@@ -209,13 +205,9 @@ def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
     def distance(to: CadEdge) -> Array:
         return np.linalg.norm(to.point(to.project(x)) - x, axis=1)
 
-    own = distance(edge)
-    slack = LINE_DISTANCE * edge.size
-    nearest = np.ones(len(x), dtype=bool)
-    for other in others:
-        if other.curve is not edge and (_at_least(x, other.curve) < own).any():
-            nearest &= own <= distance(other.curve) + slack
-    return nearest
+    own = distance(edge) - LINE_DISTANCE * edge.size
+    there = [distance(other.curve) for other in others if other.curve is not edge]
+    return np.all([own <= x for x in there], axis=0)
 
 
 def opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[Array, Array]:
@@ -248,10 +240,8 @@ def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> Mask:
     along = np.array(contact.direction)
     distance = np.abs((y - x) @ along)
     for edge in edges:
-        nearest, close = (
-            _nearest_crossing(edge.curve.samples, y, along),
-            SAMPLE_RESOLUTION * edge.curve.size,
-        )
+        nearest = _nearest_crossing(edge.curve.samples, y, along)
+        close = SAMPLE_RESOLUTION * edge.curve.size
         met = np.abs((nearest - y) @ across(along)) <= close
         behind |= met & (np.abs((y - nearest) @ along) < distance - close)
     return behind
@@ -286,8 +276,9 @@ def _divide(
 ) -> None:
     """Lay a common division {C_j} on the parts of two edges that face each other.
 
-    `beside` and `facing` are all edges of the secondary and of the primary, these two included.
-    Where sizes vary nodes lie at the points `fixed` (k, 2), else where gaps are narrowest.
+    `beside` are all edges of the secondary, `facing` those of the primary that may be the nearest,
+    these two included. Where sizes vary nodes lie at the points `fixed` (k, 2), else where gaps
+    are narrowest.
     """
     t = np.linspace(secondary.curve.start, secondary.curve.stop, DIVISION_SAMPLES)
     ends = _ends_between(contact, secondary.curve, primary.curve)
@@ -357,26 +348,21 @@ def _divide_facing(problem: Problem, edges: list[Edge], fixed: Array) -> None:
                 if contact.direction is None and len(facing) > 1:  # the nearest one counts
                     near = _near(secondary.curve, facing)
                 for primary in near:
-                    _divide(contact, secondary, primary, sides, facing, fixed)
-
-
-def _marks(face: occ.TopoDS_Shape) -> Array:
-    """Points (n, 3) that distinguish faces: vertices, centres of edges, its own."""
-    vertices = [vertex.p for vertex in face.vertices]
-    middles = [edge.center for edge in face.edges]
-    return np.array([(p.x, p.y, p.z) for p in [*vertices, *middles, face.center]])
+                    _divide(contact, secondary, primary, sides, near, fixed)
 
 
 def _coincide(one: occ.TopoDS_Shape, other: occ.TopoDS_Shape) -> bool:
-    """Whether two faces have the same area and the same points."""
-    size = one.mass**0.5
+    """Whether two faces have the same area, vertices, centres of edges and their own."""
     if abs(one.mass - other.mass) > FACE_DISTANCE * one.mass:
         return False
-    a, b = _marks(one), _marks(other)
-    if len(a) != len(b):
-        return False
-    apart = np.linalg.norm(a[:, None] - b, axis=2)
-    return bool(max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= FACE_DISTANCE * size)
+    marks = []
+    for face in (one, other):
+        edges = [edge.center for edge in face.edges]
+        points = [*(vertex.p for vertex in face.vertices), *edges, face.center]
+        marks.append(np.array([(p.x, p.y, p.z) for p in points]))
+    apart = np.linalg.norm(marks[0][:, None] - marks[1], axis=2)
+    farthest = max(apart.min(axis=0).max(), apart.min(axis=1).max())
+    return bool(farthest <= FACE_DISTANCE * one.mass**0.5)
 
 
 def identify_coinciding_faces(problem: Problem, shape: occ.TopoDS_Shape) -> None:
@@ -464,15 +450,12 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         )
     finer = BOUNDED_ZONE_FACTOR if maxh is None else 1
     maxh = extent / DEFAULT_ELEMENTS if maxh is None else maxh
+    right = f"give a length like {extent / DEFAULT_ELEMENTS:g}"
     if isinstance(maxh, bool) or not isinstance(maxh, Real):
-        raise TypeError(
-            f"maxh={maxh!r} is not a number; give a length like {extent / DEFAULT_ELEMENTS:g}"
-        )
+        raise TypeError(f"maxh={maxh!r} is not a number; {right}")
+    if not 0 < maxh < np.inf:
+        raise ValueError(f"maxh={maxh} is not positive and finite; {right}")
     maxh = float(maxh)
-    if not (np.isfinite(maxh) and maxh > 0):
-        raise ValueError(
-            f"maxh={maxh} must be positive and finite, like {extent / DEFAULT_ELEMENTS:g}"
-        )
     if problem.dim == 3:
         # Netgen would start and end threads over and over: two bodies of 500 tetrahedra took .07 s
         # so, beside other programs 2.4 s of processor time; with one thread they take .05 s.
