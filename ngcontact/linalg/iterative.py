@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,20 +13,13 @@ from .multigrid import Multigrid, StalledError
 
 LOOSE_RESIDUAL = 1e-2  # relative to the first one, at which the next active set is chosen
 TERM_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of the residual, relative to its terms
+# V-cycles with coarse matrices of another active set, from which new ones are cheaper.
+RENEWAL_CYCLES = 20
+# V-cycles for a system, two to three times those of nu = 0.3; then the matrix is factorised.
+MOST_CYCLES = 100
+RESTARTS = 3  # from the residual itself, which the iteration's own drifts from; likewise
 
 log = logging.getLogger("ngcontact")
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits of the iterations."""
-
-    # V-cycles with coarse matrices of another active set, from which new ones are cheaper:
-    renewal: int = 20
-    # V-cycles for a system, two to three times those of nu = 0.3; then the matrix is factorised:
-    cycles: int = 100
-    # Solutions from the residual itself, which the iteration's own drifts from; likewise:
-    restarts: int = 3
 
 
 class IterativeSystems(BorderedSystems):
@@ -46,18 +38,12 @@ class IterativeSystems(BorderedSystems):
         Factorises the matrix of the free unknowns (n,).
     prepare : callable
         Makes multigrid for the unknowns (n,) that are free.
-    limits : Limits, optional
-        What the iterations may cost.
     """
 
     def __init__(
-        self,
-        program: QuadraticProgram,
-        factor: Factor,
-        prepare: Callable[[Mask], Multigrid],
-        limits: Limits | None = None,
+        self, program: QuadraticProgram, factor: Factor, prepare: Callable[[Mask], Multigrid]
     ) -> None:
-        self.prepare, self.limits, self.stalled = prepare, limits or Limits(), False
+        self.prepare, self.stalled = prepare, False
         self.multigrid: Multigrid | None = None  # the solver, once there is one
         self.coarse: Mask | None = None  # (m,) the active set of its coarse matrices
         self.solved: Mask | None = None  # (m,) that of the last solution
@@ -133,12 +119,12 @@ class IterativeSystems(BorderedSystems):
             multigrid, residual, max(LOOSE_RESIDUAL * size, COARSE_RESIDUAL * self.scale)
         )
         self.unbalanced(active)  # sets the forces
-        if count > self.limits.renewal and (active != self.coarse).any():
+        if count > RENEWAL_CYCLES and (active != self.coarse).any():
             self.multigrid = self.coarse = None
 
     def _add(self, multigrid: Multigrid, residual: Array, target: float) -> int:
         """Add the solution for a residual (n,); answer the number of V-cycles."""
-        x, count = multigrid.solve(residual, target, self.limits.cycles)
+        x, count = multigrid.solve(residual, target, MOST_CYCLES)
         self.back_solves += count
         self.y += x
         return count
@@ -149,10 +135,10 @@ class IterativeSystems(BorderedSystems):
         floor = TERM_ROUND_OFF * float(terms(self.program.K, self.y).max(initial=0.0))
         target = max(FINE_RESIDUAL * self.scale, floor)
         residual = self.unbalanced(active)
-        for _ in range(self.limits.restarts):
+        for _ in range(RESTARTS):
             if multigrid.largest(residual) <= target:
                 return
             self._add(multigrid, residual, target)
             residual = self.unbalanced(active)
         if not multigrid.largest(residual) <= COARSE_RESIDUAL * self.scale:
-            raise StalledError(f"{self.limits.restarts} solutions left more than {target:.1e}")
+            raise StalledError(f"{RESTARTS} solutions left more than {target:.1e}")

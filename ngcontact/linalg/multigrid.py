@@ -63,23 +63,10 @@ class StalledError(ArithmeticError):
 
 
 class _Level:
-    """One space of n unknowns that has a coarser one of k, and vectors of both to work with.
+    """One space of n unknowns that has a coarser one of k, and vectors of both to work with."""
 
-    Attributes
-    ----------
-    matrix : ng.BaseMatrix (n, n)
-    P, transposed : ng.BaseMatrix (n, k) and (k, n)
-        Prolongation.
-    free : ndarray of bool (n,)
-        Unknowns that are corrected.
-    projector : ng.BaseMatrix
-        Onto them.
-    smoother : GaussSeidel
-        Of them.
-    """
-
-    free: Mask
-    projector: ng.BaseMatrix
+    free: Mask  # (n,), unknowns that are corrected
+    projector: ng.BaseMatrix  # onto them
 
     def __init__(self, matrix: ng.BaseMatrix, free: Mask, P: sp.csr_array) -> None:
         self.matrix, self.P = matrix, handed_over(P)
@@ -175,11 +162,7 @@ class Multigrid:
         raise StalledError(f"{count} V-cycles left {size / first:.1e} of a residual")
 
 
-def truncated_multigrid(
-    matrix: ng.BaseMatrix,
-    steps: list[Coarsening],
-    free: Mask,
-) -> Multigrid:
+def truncated_multigrid(matrix: ng.BaseMatrix, steps: list[Coarsening], free: Mask) -> Multigrid:
     """Multigrid whose coarser functions vanish at the unknowns that are not free.
 
     As in truncated monotone multigrid (Kornhuber 1994, Numer. Math. 69:167). Both halves of the

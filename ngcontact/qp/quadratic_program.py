@@ -179,11 +179,6 @@ class QuadraticProgram:
         motions = self.null_space.others
         return motions.T @ self.b, abs(motions).T @ np.abs(self.b)
 
-    @cached_property
-    def unit_rows(self) -> bool:
-        """Whether every row is a single unknown."""
-        return self.R is None
-
     def left_sides(self, y: Array) -> Array:
         """R y, (m,), for `y` (n,)."""
         return y[self.unknown] if self.R is None else np.asarray(self.R @ y)

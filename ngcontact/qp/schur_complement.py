@@ -111,7 +111,7 @@ class BorderedSystems:
         """Start from prescribed values, and the bounds of the unit rows `closed` (m,)."""
         p = self.program
         self.y = np.where(p.fixed, p.values, 0.0)
-        if closed is not None and p.unit_rows:
+        if closed is not None and p.R is None:
             self.y[p.unknown[closed]] = p.g[closed]
         self.force, self.asked, self.scale = np.zeros(p.g.size), np.zeros(0), 0.0
         self.reaction = np.zeros(p.null_space.pins.size)
@@ -160,7 +160,7 @@ class BorderedSystems:
             residual[pins] -= anchor.pull(self.y[pins])
             self.reaction = np.where(anchor.rigid, residual[pins], 0.0)
             residual[pins] -= self.reaction
-        if p.unit_rows:
+        if p.R is None:
             self.force[:] = 0.0
             self.force[active] = residual[p.unknown[active]]
             residual[p.unknown[active]] = 0.0
@@ -170,7 +170,7 @@ class BorderedSystems:
     def stiffness(self) -> Array:
         """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
         p, base = self.program, self.base
-        if p.unit_rows:
+        if p.R is None:
             return p.diagonal[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
         if base is not None:
@@ -183,7 +183,7 @@ class BorderedSystems:
         p, base = self.program, self._base_near(active, anchor)
         self.system = system = self._bordered(base, active, anchor)
         self.force[~active] = 0.0
-        if p.unit_rows:
+        if p.R is None:
             held = base.active & active
             self.y[p.unknown[held]] = p.g[held]
         if anchor is not None:
@@ -197,7 +197,7 @@ class BorderedSystems:
         """The base, or a new one where rows have cost enough, or anchors pull at other pins."""
         p, base = self.program, self.base
         pulled = np.zeros(p.null_space.pins.size) if anchor is None else anchor.stiffness
-        if base is not None and not p.unit_rows:
+        if base is not None and p.R is not None:
             return base
         if base is not None and not pulled[~base.pinned].any():
             added, at = self._changed(base, active, anchor)
@@ -205,8 +205,8 @@ class BorderedSystems:
             if len(columns) <= self.border + np.count_nonzero(base.pinned):
                 return base
         self.forget()  # two factorisations at a time would double the memory
-        closed = active & p.unit_rows
-        held = p.unknown[closed] if p.unit_rows else p.unknown  # of other rows none
+        closed = active & (p.R is None)
+        held = p.unknown[closed] if p.R is None else p.unknown  # of other rows none
         pinned = p.null_space.weakly_resisted(held) | (pulled > 0)
         free = ~p.fixed
         free[np.concatenate([p.null_space.held, p.null_space.pins[pinned], held])] = False
@@ -220,7 +220,7 @@ class BorderedSystems:
         p = self.program
         pinned = base.pinned if anchor is None else base.pinned & ~anchor.rigid
         at = p.null_space.pins[pinned]
-        if p.unit_rows:
+        if p.R is None:
             at = np.concatenate([p.unknown[base.active & ~active], at])
         return np.flatnonzero(active & ~base.active), at
 
@@ -278,7 +278,7 @@ class BorderedSystems:
             x[at] += z[: at.size]
             self.force[rows] += z[at.size :]
         self.y += x
-        if p.unit_rows:
+        if p.R is None:
             self.y[p.unknown[system.active]] = p.g[system.active]
 
     def _improve(self, system: Border, tolerance: float) -> None:

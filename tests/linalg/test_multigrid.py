@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.linalg.iterative import IterativeSystems, Limits
+from ngcontact.linalg import iterative
+from ngcontact.linalg.iterative import IterativeSystems
 from ngcontact.linalg.multigrid import LONG_ROWS, GaussSeidel, StalledError, truncated_multigrid
 from ngcontact.linalg.sparse import cholesky, congruent, handed_over
 from ngcontact.qp import BorderedSystems, Iterate, minimise
@@ -86,8 +87,8 @@ class Scene:
         self.made += 1
         return truncated_multigrid(self.matrix, steps_of(self.problem, 300), free)
 
-    def systems(self, limits=None):
-        return IterativeSystems(self.program, self.factor, self.prepare, limits)
+    def systems(self):
+        return IterativeSystems(self.program, self.factor, self.prepare)
 
     def direct(self) -> Iterate:
         return minimise(BorderedSystems(self.program, self.factor))
@@ -101,12 +102,13 @@ def same(one: Iterate, other: Iterate) -> None:
     np.testing.assert_allclose(one.force, other.force, rtol=0, atol=1e-10 * other.force.max())
 
 
-@pytest.mark.parametrize("limits", [Limits(cycles=1), Limits(restarts=0)])
-def test_systems_that_stall_are_factorised(caplog, limits: Limits):
+@pytest.mark.parametrize(("limit", "value"), [("MOST_CYCLES", 1), ("RESTARTS", 0)])
+def test_systems_that_stall_are_factorised(caplog, monkeypatch, limit: str, value: int):
     """In a Newton step, and in the last refinement."""
+    monkeypatch.setattr(iterative, limit, value)
     scene = Scene("disc", 1, 3)
     with caplog.at_level(logging.INFO, logger="ngcontact"):
-        result = minimise(scene.systems(limits))
+        result = minimise(scene.systems())
     assert caplog.text.count("the matrix is factorised: ") == 1
     assert result.factorizations > 0
     same(result, scene.direct())
