@@ -318,17 +318,17 @@ def equilibrium(
     f, work, of_rows = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
     left_sides, terms = dense(of_rows), abs(free.values).T @ np.abs(f)
     noise = np.where(np.abs(work) <= WORK_ROUND_OFF * free.most_work(f), work, 0.0)
-    unbalanced = _unbalanced(left_sides, rows.equality, work - noise)
-    if not unbalanced.is_within(WORK_NOISE * terms):
+    left, forces = _unbalanced(left_sides, rows.equality, work - noise)
+    if not _is_within(left, forces, WORK_NOISE * terms):
         _check_work(problem, free, left_sides, rows.equality, work - noise, WORK_NOISE * terms)
-    left = unbalanced.work + noise
-    unresisted = vanishing_combinations(left_sides)
-    size = np.abs(unbalanced.forces)
+    left = left + noise
+    unresisted, size = vanishing_combinations(left_sides), np.abs(forces)
     if np.sum(size > SPREAD_SHARE * size.max(initial=0.0)) < len(work) - unresisted.shape[1]:
         spread = left_sides + SPREAD_SHARE * around(left_sides)
         found = _unbalanced(spread, rows.equality, work - left)
-        if not found.is_within(np.zeros_like(work)):
-            raise _concentrated(free, rows.node, left_sides @ found.motion, found.motion, size)
+        if not _is_within(*found, np.zeros_like(work)):
+            motion = _motion_of(found[0])
+            raise _concentrated(free, rows.node, left_sides @ motion, motion, size)
     if left.any():  # Remark 3.7: without it the energy has no minimiser
         f = f - free.means @ np.linalg.solve(free.gram, left)
     placing, carries = _placing(left_sides, unresisted, work - left, rows.g, rows.equality)
@@ -369,42 +369,33 @@ def _placing(
     return scale * result.x, carries
 
 
-@dataclass(frozen=True, eq=False)
-class _Unbalanced:
-    """The `work` (r,) of a load that contact `forces` (m,) cannot balance.
+def _unbalanced(rows: Array, equality: Mask, work: Array) -> tuple[Array, Array]:
+    """Work (r,) of a load that contact forces cannot balance, and these forces (m,).
 
-    Round-off of the forces gives work on bodies that carry no load, too.
+    They are not negative but on equalities.
     """
-
-    work: Array
-    forces: Array
-
-    @property
-    def motion(self) -> Array:
-        """The motion (r,) on which this is work: what forces balance does none on it."""
-        return self.work / (np.abs(self.work).max(initial=0.0) or 1.0)
-
-    @property
-    def done(self) -> float:
-        """Work on that motion."""
-        return float(self.motion @ self.work)
-
-    def is_within(self, error: Array, beside: float = 0.0) -> bool:
-        """Whether errors (r,) of the work, round-off and work `beside` may have made it."""
-        round_off = FORCE_ROUND_OFF * np.abs(self.forces).sum()
-        return bool(self.done <= np.abs(self.motion) @ error + round_off + beside)
-
-
-def _unbalanced(rows: Array, equality: Mask, work: Array) -> _Unbalanced:
-    """Part of the work (r,) that contact forces, not negative but on equalities, cannot balance."""
     scale = np.abs(work).max(initial=0.0)
     G = np.vstack([rows, -rows[equality]]).T
     if scale == 0.0 or G.shape[1] == 0:
-        return _Unbalanced(work, np.zeros(len(rows)))
+        return work, np.zeros(len(rows))
     force = scale * nnls(G, work / scale, maxiter=100 * G.shape[1])[0]
     left, (m, pull) = work - G @ force, (len(rows), np.zeros(len(rows)))
     pull[equality] = force[m:]
-    return _Unbalanced(left, force[:m] - pull)
+    return left, force[:m] - pull
+
+
+def _motion_of(left: Array) -> Array:
+    """The motion (r,) on which this is work: what forces balance does none on it."""
+    return left / (np.abs(left).max(initial=0.0) or 1.0)
+
+
+def _is_within(left: Array, forces: Array, error: Array, beside: float = 0.0) -> bool:
+    """Whether errors (r,) of the work, round-off and work `beside` may have left it unbalanced.
+
+    Round-off of the `forces` (m,) gives work on bodies that carry no load, too.
+    """
+    motion, round_off = _motion_of(left), FORCE_ROUND_OFF * np.abs(forces).sum()
+    return bool(motion @ left <= np.abs(motion) @ error + round_off + beside)
 
 
 def _concentrated(
@@ -439,21 +430,21 @@ def _check_work(
     measured = _measured_work(problem, free)
     if measured is not None:
         work, noise = measured[0], noise + QUADRATURE_ERRORS * measured[1]
-    left = _unbalanced(rows, equality, work)
-    if left.is_within(noise):
+    left, forces = _unbalanced(rows, equality, work)
+    if _is_within(left, forces, noise):
         return
-    motion, mesh = free.motion(left.motion), free.space.trace.mesh
-    of_shape = 0.0
+    motion, mesh = free.motion(_motion_of(left)), free.space.trace.mesh
+    of_shape, done = 0.0, float(_motion_of(left) @ left)
     if len(set(motion.bodies)) == len(motion.bodies):  # their names tell them apart
         of_shape = abs(float(_change_by_shape(problem, mesh, motion).sum()))
-    if not left.is_within(noise, QUADRATURE_ERRORS * of_shape):
+    if not _is_within(left, forces, noise, QUADRATURE_ERRORS * of_shape):
         raise NoEquilibriumError(
-            f"no equilibrium: the load does the work {left.done:.6g} on a rigid {motion}, which "
+            f"no equilibrium: the load does the work {done:.6g} on a rigid {motion}, which "
             "neither supports nor contact resist; hold that body by `displacement`, `sliding` or "
             "a contact pair, or balance the load",
             body=motion.bodies[0],
             motion=motion,
-            work=left.done,
+            work=done,
         )
 
 
