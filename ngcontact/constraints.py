@@ -47,11 +47,6 @@ class Conditions:
     direction: Array  # (k, d) unit vectors a
     value: Array  # (k,) prescribed displacements along them, in units of length
 
-    def directed_as(self, other: Conditions) -> bool:
-        """Whether the others prescribe the same directions at the same nodes."""
-        same = np.array_equal(self.node, other.node)
-        return same and np.array_equal(self.direction, other.direction)
-
 
 @dataclass(frozen=True, eq=False)
 class Entries:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,19 +20,6 @@ SKIPPED_POINTS = 2
 FIT_POINTS = 8  # points of the fit, or three per order and two if that is more
 FIT_DEGREE = 3  # of the fit, 2 at order 1
 FIT_SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
-
-
-def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
-    """Neighbours of every contact point along the line, and all links (l, 2) of two points.
-
-    The two points at a corner of the line are neighbours without a distance.
-    """
-    linked = np.concatenate([links(line), twins(line)])
-    neighbours: dict[int, list[int]] = {}
-    for a, b in linked.tolist():
-        neighbours.setdefault(a, []).append(b)
-        neighbours.setdefault(b, []).append(a)
-    return neighbours, linked
 
 
 def _run_of_points(
@@ -90,7 +78,11 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     Between the two points at a corner it is the corner. The `gap` (m,) is that after deformation,
     points in contact are `active` (m,).
     """
-    neighbours, linked = _neighbours(line)
+    neighbours: dict[int, list[int]] = defaultdict(list)
+    linked = np.concatenate([links(line), twins(line)])  # at a corner without a distance
+    for a, b in linked.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
     active = in_contact(line, active)
     x, order = line.position, line.rows.shape[1] - 1
     ends, found, beyond = [], [], []

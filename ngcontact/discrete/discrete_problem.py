@@ -17,17 +17,7 @@ from ..arrays import Array, Mask, from_triplets
 from ..constraints import BasisTransformation, Conditions, Rows, held_rows
 from ..contact import ContactLine, ContactState, by_line, contact_line, for_partial_cover
 from ..errors import ConvergenceError, NoEquilibriumError
-from ..fem import (
-    LOAD_BONUS,
-    BoundaryTrace,
-    Space,
-    assemble,
-    boundary_trace,
-    initial_load,
-    load_vector,
-    model_of,
-    node_basis,
-)
+from ..fem import BoundaryTrace, Space, assemble, boundary_trace, model_of
 from ..linalg import (
     COARSEST,
     IterativeSystems,
@@ -266,23 +256,16 @@ def discretise(
     if previous is not None and not same_mesh(trace, previous.space):
         previous = None  # its mesh has been changed in place
     conditions, known = support_conditions(problem, trace), list[ContactLine]()  # (3.6), (3.8)
-    if previous is not None and conditions.directed_as(previous.conditions):
-        known = previous.found
+    if previous is not None:
+        held = previous.conditions
+        same = np.array_equal(held.node, conditions.node)
+        if same and np.array_equal(held.direction, conditions.direction):
+            known = previous.found
     found = contact_lines(problem, trace, conditions, known)  # Gamma_K, first: it may be refused
     if previous is not None and not same_stiffness(problem, previous.problem):
         previous = None
-    if previous is None:
-        space = assemble(problem, trace, element, nodal)  # V_h
-    else:
-        V = previous.space.V
-        space = replace(
-            previous.space,
-            trace=trace,
-            nodal=nodal,
-            basis=node_basis(V, trace, nodal, element),
-            f=load_vector(problem, V, LOAD_BONUS),
-            initial=initial_load(problem, V, trace),
-        )
+    stiffness = None if previous is None else previous.space
+    space = assemble(problem, trace, element, nodal, stiffness)  # V_h
     admissible = admissible_set(space, conditions, found)
     basis, rows = admissible.basis, admissible.rows
     rigid, f = equilibrium(problem, space, conditions, rows, basis, admissible.around)  # Remark 3.7
@@ -315,13 +298,7 @@ def discretise(
 def _program(
     b: Array, admissible: AdmissibleSet, rigid: Rigid | None, K: sp.csr_array
 ) -> QuadraticProgram:
-    """L over K_h in the unknowns of rows and supports, with the load `b` and stiffness `K`.
-
-    Raises
-    ------
-    ValueError
-        Double precision holds the data but neither the forces nor the displacements.
-    """
+    """L over K_h in the unknowns of rows and supports, with the load `b` and stiffness `K`."""
     basis = admissible.basis
     p = QuadraticProgram(  # (2.6)
         K=K,

@@ -7,7 +7,6 @@ from .boundary import boundary_corners as boundary_corners
 from .boundary import check_element as check_element
 from .boundary import connected_bodies as connected_bodies
 from .boundary import edge_bubbles as edge_bubbles
-from .boundary import node_basis as node_basis
 from .boundary import prescribed_components as prescribed_components
 from .boundary import unknowns as unknowns
 from .boundary import unknowns_of as unknowns_of
@@ -31,7 +30,6 @@ from .space import assemble as assemble
 from .space import body_of_unknown as body_of_unknown
 from .space import elastic_strain as elastic_strain
 from .space import energy_norm as energy_norm
-from .space import initial_load as initial_load
 from .space import law_measures as law_measures
 from .space import load_vector as load_vector
 from .space import model_of as model_of

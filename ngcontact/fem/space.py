@@ -201,17 +201,9 @@ def _form_measures(
     return _measures(where, trace.curved_elements, bonus, bonus_intorder=CURVED + bonus)
 
 
-def assemble(
-    problem: Problem, trace: BoundaryTrace, element: str, nodal: Index | None = None
-) -> Space:
-    """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks.
-
-    Node values replace NGSolve's unknowns on the segments `nodal` (k,), all when left out.
-    """
-    mesh = trace.mesh
-    V = vector_space(mesh, trace.order, element)
-    nodal = np.arange(len(trace.region)) if nodal is None else nodal
-    model, fes = model_of(problem), V
+def _stiffness(problem: Problem, trace: BoundaryTrace, V: ng.FESpace) -> ng.BilinearForm:
+    """A(u, v) of (3.1), assembled."""
+    mesh, model, fes = trace.mesh, model_of(problem), V
     if trace.order > ORDERS[-1]:  # the same unknowns by components: half the time at order 8
         fes = ng.FESpace([trace.space] * model.dim)
     u, v = fes.TrialFunction(), fes.TestFunction()
@@ -223,7 +215,24 @@ def assemble(
         for work in model.work(law.voigt(problem.model), u, v):  # (3.1)
             for dx in measures:
                 a += work * dx
-    a.Assemble()
+    return a.Assemble()
+
+
+def assemble(
+    problem: Problem,
+    trace: BoundaryTrace,
+    element: str,
+    nodal: Index | None = None,
+    known: Space | None = None,
+) -> Space:
+    """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks.
+
+    Node values replace NGSolve's unknowns on the segments `nodal` (k,), all when left out. The
+    stiffness is that of a `known` space, if there is one.
+    """
+    V = vector_space(trace.mesh, trace.order, element) if known is None else known.V
+    nodal = np.arange(len(trace.region)) if nodal is None else nodal
+    a = _stiffness(problem, trace, V) if known is None else known.form
     A = shared(a.mat)
     return Space(
         V=V,
@@ -232,7 +241,7 @@ def assemble(
         basis=node_basis(V, trace, nodal, element),
         form=a,
         A=A,
-        inner=(np.diff(A.indptr) == 0) & condense,
+        inner=(np.diff(A.indptr) == 0) & a.condense,
         f=load_vector(problem, V, LOAD_BONUS),
         initial=initial_load(problem, V, trace),
     )
