@@ -80,12 +80,9 @@ def joined(records: Sequence[Record]) -> Record:
     if len(records) == 1:
         return records[0]
     kind: Any = type(records[0])
-
-    def stacked(name: str) -> Any:
-        arrays = [getattr(record, name) for record in records]
-        return sp.vstack(arrays, format="csr") if sp.issparse(arrays[0]) else np.concatenate(arrays)
-
-    return kind(*map(stacked, _names(kind)))
+    columns = zip(*(by_field(record).values() for record in records), strict=True)
+    stack = (sp.vstack(x, "csr") if sp.issparse(x[0]) else np.concatenate(x) for x in columns)
+    return kind(*stack)
 
 
 def paths(links: Index, count: int) -> list[Index]:

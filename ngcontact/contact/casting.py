@@ -93,8 +93,6 @@ def cast(
     distances.
     """
     found = none_met(len(points), CENTRE[0])
-    if len(surface) == 0 or len(points) == 0:
-        return found
 
     def take(point: Index, facet: Index) -> None:
         """Enter the nearest of what the pairs (r,) of `point` and `facet` meet."""

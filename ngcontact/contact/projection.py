@@ -35,7 +35,7 @@ class Partners:
 
 
 def none_met(size: int, place: Array) -> Partners:
-    """Partners of points (size,) that meet nothing, with any parameter `place` (...)."""
+    """Partners of points (size,) that meet nothing, with any parameter `place` (...,)."""
     return Partners(np.full(size, -1), place[None].repeat(size, axis=0), np.full(size, np.inf))
 
 
@@ -49,7 +49,7 @@ def enter(found: Partners, point: Index, met: Partners) -> None:
 
 
 def opposes(normals: Array, directions: Array) -> Mask:
-    """Whether outward `normals` (k, d) oppose unit vectors `directions` (k, d).
+    """Whether outward `normals` (k, d) oppose unit vectors `directions` (k, d), a mask (k,).
 
     A ray along a straight boundary, such as a symmetry plane, does not meet it.
     """
@@ -139,10 +139,7 @@ def cast(
     senses count unless only points `ahead` do, so that overlapping bodies give negative distances;
     parameters within `MATCHING_DISTANCE` of an end are that end.
     """
-    found = none_met(len(points), np.zeros(()))
-    if len(curve) == 0 or len(points) == 0:
-        return found
-    t = across(directions)
+    found, t = none_met(len(points), np.zeros(())), across(directions)
     (point, segment), s = _candidates(points, t, curve)
     s = crossings(points[point], t[point], curve, segment, s)
     s = np.where(s < MATCHING_DISTANCE, 0.0, np.where(s > 1 - MATCHING_DISTANCE, 1.0, s))

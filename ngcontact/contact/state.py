@@ -248,20 +248,7 @@ def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Ar
     both normals as eigenvectors, so that both pressures are equal unless the sides are
     perpendicular. Up to a turn of 45 degrees both get one value, from the part of the node's
     force along the sum of weight times normal: what a uniform pressure on both sides exerts.
-
-    Parameters
-    ----------
-    line : ContactLine
-        The pair.
-    force : ndarray (m,)
-        At its points, per unit thickness.
-    active : ndarray of bool (m,)
-        Points in contact.
-
-    Returns
-    -------
-    ndarray (m,)
-        Force per unit length (P1) or per unit eta (P2).
+    Of the `force` (m,) per unit thickness at the points of a `line`, `active` (m,) in contact.
     """
     pressure = force / line.weight
     corners = twins(line)

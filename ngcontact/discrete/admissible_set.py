@@ -247,13 +247,7 @@ class AdmissibleSet:
 def admissible_set(
     space: Space, conditions: Conditions, found: Sequence[ContactLine]
 ) -> AdmissibleSet:
-    """K_h for the `conditions` of supports and the contact points `found` of each pair.
-
-    Raises
-    ------
-    ValueError
-        Prescribed displacements that violate a contact row.
-    """
+    """K_h for the `conditions` of supports and the contact points `found` of each pair."""
     trace = space.trace
     lines, rows = merged(list(found), contact_rows(list(found), trace))  # (2.3), (2.5), (2.10)
     length = float(np.abs(trace.curve).max())

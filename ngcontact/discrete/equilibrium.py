@@ -309,8 +309,6 @@ def equilibrium(
     NoEquilibriumError
         The load does work on a rigid motion that supports and contact admit, or needs contact
         forces at single points.
-    ValueError
-        The elements do not contain the rotation of a free body.
     """
     free = free_motions(space, conditions, model_of(problem).motions)
     if free is None:

@@ -231,7 +231,7 @@ class FacetTrace(BoundaryTrace):
 def facet_trace(mesh: ng.Mesh, order: int, bernstein: Mask | None = None) -> FacetTrace:
     """Trace of the displacements of degree `order` on the boundary of a mesh of solids.
 
-    With `bernstein` coefficients at nodes (n,), none when left out.
+    Unknowns at nodes `bernstein` (n,), none when left out, are Bernstein coefficients.
     """
     view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
     vertices = view.facets

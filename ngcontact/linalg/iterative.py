@@ -28,16 +28,7 @@ class IterativeSystems(BorderedSystems):
     Each system starts from the iterate of the one before, and is solved as closely as telling
     the next active set takes, to 1e-2 of its first residual; `refine` takes it to round-off. Where
     V-cycles do not converge, and for proximal terms, which motions that nothing resists need, the
-    matrix is factorised for good.
-
-    Parameters
-    ----------
-    program : QuadraticProgram
-        With n unknowns and m rows.
-    factor : Factor
-        Factorises the matrix of the free unknowns (n,).
-    prepare : callable
-        Makes multigrid for the unknowns (n,) that are free.
+    matrix is factorised for good. `prepare` makes multigrid for the unknowns (n,) that are free.
     """
 
     def __init__(

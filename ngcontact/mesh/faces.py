@@ -25,17 +25,11 @@ POLE_SINE = 1e-9  # sine of the angle of both tangents, below which the surface 
 
 
 class CadFace:
-    """One CAD face as a parametrised surface.
-
-    Attributes
-    ----------
-    name : str
-        Boundary name.
-    """
+    """One CAD face as a parametrised surface."""
 
     def __init__(self, face: TopoDS_Shape) -> None:
         self._surface = face.surf
-        self.name = face.name or ""
+        self.name = face.name or ""  # of the boundary
         self._plane: dict[tuple[float, ...], Array] = {}
 
     def _at(self, uv: Array) -> tuple[Array, Array]:

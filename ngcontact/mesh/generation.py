@@ -479,15 +479,9 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
 def graded_mesh(problem: Problem, size: Size, places: Array) -> ng.Mesh:
     """Mesh of a plane problem's geometry with sizes that vary, matched on facing lines.
 
-    Parameters
-    ----------
-    problem : Problem
-        With a geometry.
-    size : callable
-        Largest length (k,) of the sides of elements on edges at points (k, 2); inside of bodies
-        elements grow from there.
-    places : ndarray (k, 2)
-        Points of the secondary contact lines at which nodes lie, and those that face them.
+    The `size` is the largest length (k,) of the sides of elements on edges at points (k, 2); inside
+    of bodies elements grow from there. Nodes lie at the `places` (k, 2) on secondary contact lines,
+    and at what faces them.
 
     Raises
     ------
