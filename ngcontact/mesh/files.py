@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import itertools
 import os
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -107,14 +108,12 @@ def _mesh_of(file: Any) -> ng.Mesh:
         own = numbers.reshape(triangles.shape)[names == body]
         mesh.AddElements(2, k, np.ascontiguousarray(own, dtype=np.int32))
     curves: list[occ.Edge] = []
-    turn = 0.0
     if any(side.middle >= 0 for side in sides):
         curves, turn = _curves(points, runs)
     else:  # one region a name
-        by_name = defaultdict(list)
-        for side in sides:
-            by_name[side.name].append(side)
-        runs = list(by_name.values())
+        every = dict.fromkeys(side.name for side in sides)
+        runs = [[side for side in sides if side.name == name] for name in every]
+        turn = max((_turn(*x) for x in _smooth(points, sides, by_name=True).values()), default=0.0)
     for k, run in enumerate(runs, start=1):
         ends = np.searchsorted(used, [(side.start, side.stop) for side in run])
         mesh.AddElements(1, k, np.ascontiguousarray(ends, dtype=np.int32))
@@ -133,7 +132,7 @@ def _mesh_of(file: Any) -> ng.Mesh:
             f"sides of second order in a file turn by up to {np.rad2deg(turn):.2g} degrees where "
             "curves are taken for smooth: normals are known to about that"
         )
-    elif (turn := _turn_of_polygons(points, sides)) > POLYGON:
+    elif turn > POLYGON:
         warn(
             f"straight sides of a file turn by {np.rad2deg(turn):.2g} degrees without corners: "
             "if they are to be a curve, refinement does not make it round; write the file in "
@@ -298,30 +297,35 @@ def _runs(points: Array, sides: list[_Side]) -> Iterator[list[_Side]]:
         yield run
 
 
+def _smooth(
+    points: Array, sides: Iterable[_Side], *, by_name: bool
+) -> dict[tuple[int, str], list[Array]]:
+    """Both tangents (2,) at nodes where two sides, of one name, turn by less than a corner."""
+    at: dict[tuple[int, str], list[Array]] = defaultdict(list)
+    for side in sides:
+        for node, tangent in zip((side.start, side.stop), _tangents(points, side), strict=True):
+            at[node, side.name if by_name else ""].append(tangent)
+    return {k: x for k, x in at.items() if len(x) == 2 and _turn(*x) < CORNER}
+
+
 def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], float]:
     """An edge of a drawing for each run, and the largest turn (radians) where they are smooth."""
-    at: dict[int, list[Array]] = defaultdict(list)  # tangents at nodes
-    for run in runs:
-        for side in run:
-            first, last = _tangents(points, side)
-            at[side.start].append(first)
-            at[side.stop].append(last)
-    smooth = {n: (x[0] + x[1]) for n, x in at.items() if len(x) == 2 and _turn(*x) < CORNER}
-    largest, found = 0.0, []
+    pairs = _smooth(points, itertools.chain(*runs), by_name=False)
+    smooth, largest, found = {node: x for (node, _), x in pairs.items()}, 0.0, []
     for run in runs:
         nodes = [run[0].start] + [n for s in run for n in (s.middle, s.stop) if n >= 0]
         x = points[nodes]
         if run[0].middle < 0:
             edge = occ.Segment(*(occ.Pnt(*p, 0) for p in x[[0, -1]]))
         else:
-            largest = max([largest, *(_turn(*at[s.stop]) for s in run if s.stop in smooth)])
+            largest = max([largest, *(_turn(*smooth[s.stop]) for s in run if s.stop in smooth)])
             closed = nodes[0] == nodes[-1] and nodes[0] in smooth
             t = distances_along(x)
             slope = make_interp_spline(
                 t, x, min(5, len(x) - 1), bc_type="periodic" if closed else None
             )(t, 1)
             for k in () if closed else (0, -1):  # it goes on in another curve, or a straight line
-                slope[k] = smooth.get(nodes[k], slope[k])
+                slope[k] = np.sum(smooth.get(nodes[k], [slope[k]]), axis=0)
             # The kernel compares the lengths of tangents with `tol`, and uses their directions.
             step = float(chords(x).min())
             slope *= step / np.linalg.norm(slope, axis=1)[:, None]
@@ -344,13 +348,3 @@ def _check_curved(mesh: ng.Mesh) -> None:
     if bad.any():
         x, y = ng.CF((ng.x, ng.y))(points[bad][:1])[0]
         raise ValueError(f"curved sides fold a cell near ({x:.6g}, {y:.6g}): mesh it finer there")
-
-
-def _turn_of_polygons(points: Array, sides: list[_Side]) -> float:
-    """The largest turn (radians), less than a corner's, between straight sides of one name."""
-    at: dict[tuple[int, str], list[Array]] = defaultdict(list)
-    for side in sides:
-        for node, tangent in zip((side.start, side.stop), _tangents(points, side), strict=True):
-            at[node, side.name].append(tangent)
-    turns = [_turn(*x) for x in at.values() if len(x) == 2]
-    return max((turn for turn in turns if turn < CORNER), default=0.0)
