@@ -54,7 +54,7 @@ def test_all_matrices_of_a_problem_have_short_indices(order):
     from ngcontact import solve
 
     d = solve(cases.pressed_disc(), maxh=0.5, order=order).discrete
-    for matrix in (d.space.A, d.space.basis, d.basis.T, d.B, d.program.K):
+    for matrix in (d.space.A, d.space.basis, d.basis.T, d.rows.matrix, d.program.K):
         assert isinstance(matrix, sp.csr_array)
         assert matrix.indices.dtype == matrix.indptr.dtype == np.int32
 

@@ -80,7 +80,7 @@ def linear_systems(
     trace = space.trace
     if matrix is None:
         links = from_triplets(*basis.links, basis.T.shape)
-        factor = cholesky_of_closed_rows(space.matrix, space.A, space.basis, basis.T, links)
+        factor = cholesky_of_closed_rows(space.form.mat, space.A, space.basis, basis.T, links)
     else:
         factor = cholesky(matrix)
     parents = vertex_parents(trace.mesh)
@@ -116,11 +116,6 @@ class DiscreteProblem:
     systems: BorderedSystems  # its linear systems, with the factorisation once there is one
     rigid: Rigid | None  # rigid motions that supports leave free, if there are any
     assembled: bool  # False where the stiffness is that of an earlier problem
-
-    @property
-    def B(self) -> sp.csr_array:
-        """Contact rows (m, 2n) on node values, all pairs in order."""
-        return self.rows.matrix
 
     def influence(self, active: Mask, jumps: Array) -> Iterate:
         """The displacement of least energy that moves the `active` (m,) points by `jumps` (m,).
@@ -277,7 +272,7 @@ def discretise(
         program = _program(b, admissible, rigid, previous.program.K)
         systems = previous.systems
     else:
-        K, matrix = congruent(space.matrix, space.A, T)
+        K, matrix = congruent(space.form.mat, space.A, T)
         program = _program(b, admissible, rigid, K)
         systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
@@ -332,7 +327,7 @@ def reassembled(
     the linear systems, `rigid` without its space.
     """
     basis, rigid = arrays["basis"], arrays["rigid"]
-    K, matrix = congruent(space.matrix, space.A, space.basis @ basis.T)
+    K, matrix = congruent(space.form.mat, space.A, space.basis @ basis.T)
     again = QuadraticProgram(K=K, **program)
     systems = linear_systems(again, matrix, space, basis)
     kept = arrays | {"rigid": rigid and rigid.on(space)}

@@ -47,8 +47,8 @@ class Space:
     # (2N, 2n) from n node values there, and unknowns elsewhere, to the unknowns of V.
     basis: sp.csr_array
     form: ng.BilinearForm
-    # (2N, 2N), its stiffness; where there are unknowns `inner`, of elements alone, the Schur
-    # complement of these, whose rows are empty (static condensation)
+    # (2N, 2N), its stiffness, in the memory of `form.mat`; where there are unknowns `inner`, of
+    # elements alone, the Schur complement of these, whose rows are empty (static condensation)
     A: sp.csr_array
     inner: Mask  # (2N,)
     f: Array  # (2N,), load
@@ -59,14 +59,9 @@ class Space:
         """Load with initial strains, (2N,): A u is this where nothing is held."""
         return self.f if self.initial is None else self.f + self.initial
 
-    @property
-    def matrix(self) -> ng.BaseMatrix:
-        """A for NGSolve, in the same memory."""
-        return self.form.mat
-
     def _times(self, operator: ng.BaseMatrix, x: Array) -> Array:
         """An operator of the form times `x` (2N,), which is (2N,)."""
-        right, product = self.matrix.CreateRowVector(), self.matrix.CreateColVector()
+        right, product = self.form.mat.CreateRowVector(), self.form.mat.CreateColVector()
         right.FV().NumPy()[:] = x
         product.data = operator * right
         return np.asarray(product.FV().NumPy())

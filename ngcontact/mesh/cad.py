@@ -124,14 +124,6 @@ class CadEdge:
         missed = np.abs(along(self.point(t)) - values) > LEVEL_DISTANCE * self.size
         return np.where(missed, np.nan, t)
 
-    def opposite(self, points: Array, normals: Array) -> Array:
-        """Parameters (k,) where the lines through `points` (k, 2) along `normals` (k, 2) meet it.
-
-        The one near the closest point of the edge; NaN where there is none.
-        """
-        beside = across(normals)
-        return self.level(beside, (points * beside).sum(axis=1), points)
-
 
 @lru_cache(maxsize=1)  # for all meshes of one adaptive run
 def _edges(geometry: OCCGeometry) -> list[CadEdge]:

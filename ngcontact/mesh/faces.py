@@ -32,15 +32,11 @@ class CadFace:
         self.name = face.name or ""  # of the boundary
         self._plane: dict[tuple[float, ...], Array] = {}
 
-    def _at(self, uv: Array) -> tuple[Array, Array]:
+    def at(self, uv: Array) -> tuple[Array, Array]:
         """Points (k, 3) and both tangents (k, 3, 2) at parameters `uv` (k, 2)."""
         found = [self._surface.D1(float(u), float(v)) for u, v in uv]
         values = np.array([[(a.x, a.y, a.z) for a in one] for one in found]).reshape(-1, 3, 3)
         return values[:, 0], values[:, 1:].transpose(0, 2, 1)
-
-    def point(self, uv: Array) -> Array:
-        """Points (k, 3) at parameters `uv` (k, 2)."""
-        return self._at(uv)[0]
 
     def normal_at(self, uv: Array) -> Array:
         """Unit normals (k, 3) at parameters `uv` (k, 2), on one side of the face or the other."""
@@ -63,7 +59,7 @@ class CadFace:
         uv, size = uv.copy(), np.abs(points).max(initial=0.0)
         rest = np.arange(len(uv))
         for _ in range(NEWTON_STEPS):
-            x, t = self._at(uv[rest])
+            x, t = self.at(uv[rest])
             # At a pole one tangent vanishes: that parameter stays.
             step = (np.linalg.pinv(t, rcond=POLE_SINE) @ (points[rest] - x)[..., None])[..., 0]
             uv[rest] += step
@@ -155,5 +151,5 @@ def beyond_faces(mesh: ng.Mesh, facets: Index, points: Array, outward: Array) ->
             feet = face.project(points[at], unwrapped(uv).mean(axis=1))
             normal = face.normal_at(feet)
             normal *= np.sign((normal * outward[at]).sum(axis=1))[:, None]
-            beyond[at] = ((points[at] - face.point(feet)) * normal).sum(axis=1)
+            beyond[at] = ((points[at] - face.at(feet)[0]) * normal).sum(axis=1)
     return beyond

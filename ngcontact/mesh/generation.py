@@ -219,7 +219,8 @@ def opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[
         t = other.project(x)
         apart = np.linalg.norm(other.point(t) - x, axis=1) > LINE_DISTANCE * other.size
         if contact.gap is None and apart.any():  # clearance or interference: along the normals
-            t[apart] = other.opposite(x[apart], rightward(slope[apart]))
+            beside, far = across(rightward(slope[apart])), x[apart]
+            t[apart] = other.level(beside, (far * beside).sum(axis=1), far)
         else:
             t[apart] = np.nan  # (2.3): common nodes
     else:

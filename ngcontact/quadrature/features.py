@@ -385,10 +385,8 @@ def _in_body(
     for component in searched.T:
         array = np.full(shape, np.nan)
         array[inside] = component
-        some = np.zeros(shape, dtype=bool)  # a feature is left within half of the smaller window
-        for axis in (0, 1):
-            step = np.abs(np.diff(array, axis=axis, append=np.nan)) > limit / windows[0]
-            some |= step
+        steps = [np.abs(np.diff(array, axis=axis, append=np.nan)) for axis in (0, 1)]
+        some = np.fmax(*steps) > limit / windows[0]  # a feature is left within half of the window
         if not some.any():
             continue
         part = tuple(slice(max(k.min() - wide, 0), k.max() + wide + 2) for k in np.nonzero(some))

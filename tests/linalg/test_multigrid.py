@@ -19,7 +19,7 @@ def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):
     problem = discrete(REFINED[name], order, rounds, maxh)
     p = problem.program
     K, matrix = congruent(
-        problem.space.matrix, problem.space.A, problem.space.basis @ problem.basis.T
+        problem.space.form.mat, problem.space.A, problem.space.basis @ problem.basis.T
     )
     free = ~p.fixed
     free[p.unknown[: len(p.unknown) // 2]] = False
@@ -79,7 +79,7 @@ class Scene:
         self.problem = discrete(REFINED[name], order, rounds, maxh)
         self.program = self.problem.program
         space = self.problem.space
-        _, self.matrix = congruent(space.matrix, space.A, space.basis @ self.problem.basis.T)
+        _, self.matrix = congruent(space.form.mat, space.A, space.basis @ self.problem.basis.T)
         self.factor = cholesky(self.matrix)
         self.made = 0
 

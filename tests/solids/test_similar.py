@@ -77,7 +77,11 @@ def test_the_algebra_alone(order):
     solution = solve(problem, order=order)
     discrete, space = solution.discrete, solution.discrete.space
     N, c = space.basis, discrete.conditions
-    A, f, B = (sp.csr_array(N.T @ space.A @ N), N.T @ space.right_side, sp.csr_array(discrete.B))
+    A, f, B = (
+        sp.csr_array(N.T @ space.A @ N),
+        N.T @ space.right_side,
+        sp.csr_array(discrete.rows.matrix),
+    )
     axis, n = c.direction.argmax(axis=1), len(f) // 3
     held, value = np.zeros(len(f), dtype=bool), np.zeros(len(f))
     held[axis * n + c.node], value[axis * n + c.node] = True, c.value
