@@ -118,12 +118,6 @@ class FreeMotions:
         both = zip(self.bodies.names, self.of_bodies, strict=True)
         return [name for name, part in both if part.any()]
 
-    def most_work(self, f: Array) -> Array:
-        """Work (r,) that a load `f` (d * N,) would do if all of it acted along the motions."""
-        size = np.bincount(body_of_unknown(self.space, self.bodies), np.abs(f))
-        body = self.of_bodies.any(axis=1).argmax(axis=0)  # each moves one body
-        return np.asarray(_largest(self.values) * size[body])
-
     @cached_property
     def means(self) -> Columns:
         """Integrals (d * N, r) of v.z over the boundaries for the motions z, made on first use."""
@@ -315,7 +309,10 @@ def equilibrium(
         return None, space.f
     f, work, of_rows = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
     left_sides, terms = dense(of_rows), abs(free.values).T @ np.abs(f)
-    noise = np.where(np.abs(work) <= WORK_ROUND_OFF * free.most_work(f), work, 0.0)
+    # If all of the load on a body acted along its motions, each of which moves one body:
+    of_body = np.bincount(body_of_unknown(space, free.bodies), np.abs(f))
+    most = _largest(free.values) * of_body[free.of_bodies.any(axis=1).argmax(axis=0)]
+    noise = np.where(np.abs(work) <= WORK_ROUND_OFF * most, work, 0.0)
     left, forces = _unbalanced(left_sides, rows.equality, work - noise)
     if not _is_within(left, forces, WORK_NOISE * terms):
         _check_work(problem, free, left_sides, rows.equality, work - noise, WORK_NOISE * terms)
@@ -352,8 +349,8 @@ def _placing(
     free = ~equality
     result = linprog(
         -work / force,
-        A_ub=rows[free] if free.any() else None,
-        b_ub=g[free] / scale if free.any() else None,
+        A_ub=rows[free],
+        b_ub=g[free] / scale,
         A_eq=np.vstack([rows[equality], unresisted.T]),
         b_eq=np.concatenate([g[equality] / scale, np.zeros(unresisted.shape[1])]),
         bounds=(None, None),
@@ -362,8 +359,7 @@ def _placing(
     if result.status != 0:
         return no_motion
     carries = np.zeros(len(g), dtype=bool)
-    if free.any():
-        carries[free] = result.ineqlin.marginals < -NULL_SPACE_TOLERANCE
+    carries[free] = result.ineqlin.marginals < -NULL_SPACE_TOLERANCE
     return scale * result.x, carries
 
 

@@ -19,10 +19,6 @@ PRODUCT_ROUND_OFF = 1e-14  # of products of changes of basis, whose entries are 
 MAX_LINKS = 10  # bodies whose contact lines share nodes; more only in rings
 
 
-class RingError(ArithmeticError):
-    """Contact rows refer to each other in a ring: their unknowns have no local inverse."""
-
-
 @dataclass(frozen=True, eq=False)
 class Coarsening:
     """The step to a coarser space."""
@@ -43,8 +39,8 @@ def coarsenings(
 
     Raises
     ------
-    RingError
-        Contact rows refer to each other in a ring.
+    ArithmeticError
+        Contact rows refer to each other in a ring: their unknowns have no local inverse.
     """
     n, vertices = T.shape[0] // d, len(parents)
     steps = [(linear, np.arange(vertices))] if n > vertices else []
@@ -127,4 +123,4 @@ def _inverse_of_blocks(T: sp.csr_array, d: int) -> sp.csr_array:
         if term.nnz == 0:
             return inverse.tocsr()
         inverse, term = inverse + term, rest @ term
-    raise RingError("contact rows refer to each other in a ring")
+    raise ArithmeticError("contact rows refer to each other in a ring")

@@ -62,11 +62,7 @@ class NullSpace:
 
     def resisted(self, rows: Index) -> bool:
         """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
-        if self.pins.size == 0 or len(rows) < self.pins.size:
-            return self.pins.size == 0
-        part = dense(self.others[rows])
-        least = np.linalg.svd(part, compute_uv=False)[-1]
-        return bool(least > NULL_SPACE_TOLERANCE * np.sqrt(len(part)))
+        return self.unresisted(rows).size == 0
 
     def unresisted(self, rows: Index, tolerance: float = NULL_SPACE_TOLERANCE) -> Array:
         """Combinations (q, k) of `others` that rows with the unknowns `rows` (m,) do not resist."""
@@ -80,8 +76,6 @@ class NullSpace:
 
     def weakly_resisted(self, rows: Index) -> Mask:
         """Pins (q,) of the motions that rows with the unknowns `rows` (m,) hardly resist."""
-        if self.pins.size == 0:
-            return np.zeros(0, dtype=bool)
         return self.held_by(self.unresisted(rows, WEAK_RESISTANCE))
 
 

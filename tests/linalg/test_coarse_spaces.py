@@ -9,7 +9,7 @@ from ngcontact.arrays import from_triplets
 from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg import sparse
-from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
+from ngcontact.linalg.coarse_spaces import COARSEST, coarsenings
 from ngcontact.linalg.sparse import cholesky_of_closed_rows, congruent, shared
 
 FIRST = 4  # vertices of each line at first
@@ -112,7 +112,7 @@ def test_small_spaces_have_no_coarser_ones():
 def test_rows_in_a_ring_are_refused():
     T = sp.eye_array(8, format="lil")
     T[0, 1] = T[1, 0] = 0.5
-    with pytest.raises(RingError, match="ring"):
+    with pytest.raises(ArithmeticError, match="ring"):
         coarsenings(T.tocsr(), np.array([[-1, -1]] * 2 + [[0, 1]] * 2), sp.eye_array(4), 0)
 
 
