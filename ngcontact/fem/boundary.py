@@ -404,23 +404,34 @@ class BoundaryTrace:
         return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
 
     def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
-        """Number the nodes of several segments: once each, twice at a corner.
+        """Number the nodes of several segments: a point each, at corners one for each side.
 
-        Points (k,) of `node` (k,) on `segment` (k,), where shared nodes occur twice; and a unit
-        vector (m, 2) of each point, the mean by segment length of `vector` (k, 2), such as the
-        normal there: the forces of a uniform pressure on both segments add up along it.
+        Points (k,) of `node` (k,) on `segment` (k,), where shared nodes occur several times; and a
+        unit vector (m, d) of each point, the mean by segment length or area of `vector` (k, d),
+        such as the normal there: the forces of a uniform pressure on all segments add up along it.
+        Segments at a node are on one side where vectors are linked by angles that make no corner.
         """
-        _, number = np.unique(node, return_inverse=True)
-        order = np.argsort(number, kind="stable")
-        first, second = order[:-1], order[1:]
-        shared = number[first] == number[second]
-        first, second = first[shared], second[shared]
-        turn = np.linalg.norm(vector[first] - vector[second], axis=1)
-        second = second[self._corner(segment[first], segment[second], turn)]
-        number[second] = number.max(initial=-1) + 1 + np.arange(second.size)
-        mean = np.zeros((number.max(initial=-1) + 1, 2))
-        np.add.at(mean, number, vector * self.lengths(segment)[:, None])
+        order = np.lexsort((self._grouped(segment), node))
+        _, first, size = np.unique(node[order], return_index=True, return_counts=True)
+        number, count = np.empty(len(node), dtype=np.intp), len(first)
+        number[order] = np.repeat(np.arange(count), size)
+        one = order[first][number]  # of the segments at the node
+        turn = np.linalg.norm(vector - vector[one], axis=1)
+        for i in np.unique(number[self._corner(segment[one], segment, turn)]):
+            at = order[first[i] : first[i] + size[i]]
+            for k in range(1, size[i]):
+                before, each = at[:k], np.repeat(at[k], k)
+                turn = np.linalg.norm(vector[each] - vector[before], axis=1)
+                linked = before[~self._corner(segment[before], segment[each], turn)]
+                number[at[k]] = number[linked[0]] if linked.size else count
+                count += not linked.size
+        mean = np.zeros((count, self.model.dim))
+        np.add.at(mean, number, vector * self.sizes(segment)[:, None])
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
+
+    def _grouped(self, segment: Index) -> Index:
+        """Keys (k,) by which those of `segment` (k,) at one node are looked at in order."""
+        return np.arange(len(segment))
 
 
 def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:

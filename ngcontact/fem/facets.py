@@ -162,30 +162,8 @@ class FacetTrace(BoundaryTrace):
         points["x"], points["y"] = s[:, 0], s[:, 1]
         return np.asarray(function(points)).reshape(len(segment), function.dim)
 
-    def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
-        """Number the nodes of several facets: a point each, at edges of the body one a face.
-
-        Points (k,) of `node` (k,) on `segment` (k,), and their mean vectors (m, 3) by area of
-        `vector` (k, 3), as in the plane. Facets at a node are on one side where their vectors are
-        linked by angles that make no edge.
-        """
-        order = np.lexsort((self.region[segment], node))
-        _, first, size = np.unique(node[order], return_index=True, return_counts=True)
-        number, count = np.empty(len(node), dtype=np.intp), len(first)
-        number[order] = np.repeat(np.arange(count), size)
-        one = order[first][number]  # of the facets at the node
-        turn = np.linalg.norm(vector - vector[one], axis=1)
-        for i in np.unique(number[self._corner(segment[one], segment, turn)]):
-            at = order[first[i] : first[i] + size[i]]
-            for k in range(1, size[i]):
-                before, each = at[:k], np.repeat(at[k], k)
-                turn = np.linalg.norm(vector[each] - vector[before], axis=1)
-                linked = before[~self._corner(segment[before], segment[each], turn)]
-                number[at[k]] = number[linked[0]] if linked.size else count
-                count += not linked.size
-        mean = np.zeros((count, 3))
-        np.add.at(mean, number, vector * self.sizes(segment)[:, None])
-        return number, mean / np.linalg.norm(mean, axis=1)[:, None]
+    def _grouped(self, segment: Index) -> Index:
+        return self.region[segment]  # facets of one face after another
 
     def nodal_basis(self, segments: Index) -> sp.csr_array:
         """Matrix (n, n) from unknowns at the nodes of `segments` (k,), and others, to NGSolve's."""
