@@ -248,8 +248,8 @@ def _proof(
     before = [(x.cells, x.program.multipliers, x.elements) for x in known]
     mu, elements = elements_of(problem, cells, displacement, degree, before)
     # 3. The gap, on guides and on Gamma_K.
-    prescribed = prescribed_on_supports(cells, given, displacement)
-    side, degrees = np.flatnonzero(np.isin(cells.segment, guided)), (degree - extent, lift)
+    prescribed = prescribed_on_supports(problem, cells, displacement)
+    side, degrees = cells.sides_on(guided), (degree - extent, lift)
     lines = [guide_sides(cells, displacement, side, degrees)] if side.size else []
     holding = [(x.side, x.direction[:, [0, -1]]) for x in prescribed]
     held = held_motions(cells, holding + [(x.side, TO_ENDS @ x.direction) for x in lines])
@@ -278,15 +278,15 @@ def _proof(
         "loads": float(D @ (2 * c + D)),
     }
     # What holds free motions does work on u_h, of which L(u_h) does not tell.
-    idle = stress.free_force and stress.free_force * largest(elements, cells, displacement)
+    idle = stress.free_force and stress.free_force * largest(elements, displacement)
     below = float(c @ c / 2 + D @ (c + D / 2 + 2 * w)) - stress.work + idle
     above = float((c + D + w / 2) @ w) + stress.work + closed + idle
     return Proof(problem, dual, stress, lifting=w, parts=parts, below=below, above=above)
 
 
-def largest(elements: Sequence[Element], cells: Cells, function: ng.CoefficientFunction) -> float:
+def largest(elements: Sequence[Element], function: ng.CoefficientFunction) -> float:
     """The largest component of a function at points of quadrature."""
-    return max(float(np.abs(e.places.evaluate(cells, function)).max()) for e in elements)
+    return max(float(np.abs(e.places.evaluate(function)).max()) for e in elements)
 
 
 def refuse_bound(problem: Problem, trace: BoundaryTrace, pairs: Sequence[ContactState]) -> None:

@@ -8,7 +8,7 @@ several sides require it, first about the middle. Where data are no polynomials 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,6 +20,7 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import MeshArrays
+from .polynomials import coordinates
 
 NEWTON_STEPS = 8
 NEWTON_STEP = 1e-9  # of an element: the next step is round-off
@@ -72,10 +73,10 @@ class Cells:
         start = np.roll(self.triangles, -1, axis=1)
         return start != self.ends[self.sides, 0]
 
-    @cached_property
+    @property
     def inner(self) -> Mask:
         """Sides (e,) between two triangles."""
-        return np.bincount(self.sides.ravel(), minlength=len(self.ends)) > 1
+        return self.segment < 0
 
     @cached_property
     def on_axis(self) -> Mask:
@@ -93,6 +94,10 @@ class Cells:
     def lengths(self) -> Array:
         """Lengths (k,) of the chords of sides."""
         return np.linalg.norm(np.diff(self.vertices[self.ends], axis=1)[:, 0], axis=1)
+
+    def sides_on(self, segments: Index) -> Index:
+        """Sides (k,) that are parts of `segments` (j,) of the boundary."""
+        return np.flatnonzero(np.isin(self.segment, segments))
 
     def on_side(self, side: Index, t: Array) -> tuple[Index, Array]:
         """Segments (k,) and parameters s, like `t`, of places `t` (k,) or (k, j) on `side` (k,)."""
@@ -165,18 +170,52 @@ class Cells:
 class Places:
     """Quadrature points of b triangles, q in each."""
 
+    cells: Cells
     at: Index  # (b,) the triangles
     local: Array  # (q, 2) their places (a, b) in each, as of `Cells.image`
     x: Array  # (b, q, 2) points, lengths
     slopes: Array  # (b, q, 2, 2) derivatives by (a, b)
     weight: Array  # (b, q) weights in the plane times the model's measure
-    reference: Array  # (b, q, 2) reference coordinates in the parents
 
-    def evaluate(self, cells: Cells, function: ng.CoefficientFunction) -> Array:
+    @cached_property
+    def corners(self) -> Array:
+        """Corners (b, 3, 2) of the triangles, lengths."""
+        return self.cells.corners[self.at]
+
+    def part(self, rows: Index, cells: Cells, at: Index) -> Places:
+        """Those of the triangles `rows` (r,), which are `at` (r,) of other `cells`."""
+        x, slopes, weight = self.x[rows], self.slopes[rows], self.weight[rows]
+        return Places(cells, at, self.local, x, slopes, weight)
+
+    @cached_property
+    def affine(self) -> Array:
+        """(a, b) in straight triangles with the same corners: (b, q, 2), or (q, 2) in all."""
+        curved = self.cells.curved[self.at].any()
+        return coordinates(self.corners, self.x) if curved else self.local
+
+    @cached_property
+    def reference(self) -> Array:
+        """Reference coordinates (b, q, 2) in the parents."""
+        cells, at = self.cells, self.at
+        shares = np.column_stack([self.local[:, 1], 1 - self.local.sum(axis=1), self.local[:, 0]])
+        found = shares @ cells.barycentric[at, :, :2]
+        bent = np.flatnonzero(cells.trace.curved_elements[cells.parent[at]])
+        owner, flat = np.repeat(at[bent], len(shares)), found[bent].reshape(-1, 2)
+        for _ in range(NEWTON_STEPS if bent.size else 0):
+            slope = cells.evaluate(ng.specialcf.JacobianMatrix(2), owner, flat).reshape(-1, 2, 2)
+            miss = self.x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)
+            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            flat += step
+            if np.abs(step).max() <= NEWTON_STEP:
+                break
+        found[bent] = flat.reshape(-1, *found.shape[1:])
+        return found
+
+    def evaluate(self, function: ng.CoefficientFunction) -> Array:
         """Values (b, q, dim) of a function at the points."""
         b, q = self.weight.shape
         flat = self.reference.reshape(-1, 2)
-        return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
+        return self.cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
 
 
 def places(cells: Cells, at: Index, order: int) -> Places:
@@ -189,7 +228,7 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     ContactError
         A curved side goes beyond the middle of its element.
     """
-    if len(at) and cells.curved[at[0]]:
+    if cells.curved[at].any():
         g, w = gauss(order)
         sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
         local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, w).ravel()
@@ -200,19 +239,17 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     area = slopes[..., 0, 0] * slopes[..., 1, 1] - slopes[..., 0, 1] * slopes[..., 1, 0]
     if not (area > 0).all():
         raise ContactError("a curved side of the mesh goes beyond the middle of its element")
-    shares = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
-    found = shares @ cells.barycentric[at, :, :2]
-    bent = np.flatnonzero(cells.trace.curved_elements[cells.parent[at]])
-    owner, flat = np.repeat(at[bent], len(weight)), found[bent].reshape(-1, 2)
-    for _ in range(NEWTON_STEPS if bent.size else 0):
-        slope = cells.evaluate(ng.specialcf.JacobianMatrix(2), owner, flat).reshape(-1, 2, 2)
-        miss = x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)
-        step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
-        flat += step
-        if np.abs(step).max() <= NEWTON_STEP:
-            break
-    found[bent] = flat.reshape(-1, *x.shape[1:])
-    return Places(at, local, x, slopes, area * weight * cells.measure(x), found)
+    return Places(cells, at, local, x, slopes, area * weight * cells.measure(x))
+
+
+def alike(kind: Sequence[np.ndarray], some: Index) -> Iterator[tuple[list[int], Index]]:
+    """The kinds of triangles `some` (k,), each with its triangles (b,).
+
+    `kind` (n,) or (n, j) each are numbers of all n triangles that are the same in one.
+    """
+    kinds, number = np.unique(np.column_stack(kind)[some], axis=0, return_inverse=True)
+    for k, one in enumerate(kinds.tolist()):
+        yield one, some[number.ravel() == k]
 
 
 def cells_of(trace: BoundaryTrace, cuts: tuple[Index, Array]) -> Cells:
@@ -295,13 +332,18 @@ def _lengths(corners: Array) -> Array:
 
 
 def _with_parts(
-    cells: Cells, new: Array, of: Index, triangles: Index, places: Array
+    cells: Cells, of: Index, order: Index, moved: Index, number: Index, share: Array, new: Array
 ) -> tuple[Cells, Index]:
-    """The cells with `triangles` (k, 3) in place of those that they are part `of` (k,).
+    """The cells with k others in place of those that these are part `of` (k,).
 
-    And the cells (m,) that each is or is part of.
-    `new` (r, 2) are added vertices, `places` (k, 3, 3) the barycentric coordinates of the corners.
+    Of the corners in an `order` (k, 3) one, `moved` (k,), becomes the vertex that is `number` (k,)
+    of the `new` (r, 2) ones, with shares `share` (k, 3) of the corners. Also returned are the
+    cells (m,) that each of all is or is part of.
     """
+    every = np.arange(len(of))
+    triangles, places = (x[of[:, None], order] for x in (cells.triangles, cells.barycentric))
+    triangles[every, moved] = len(cells.vertices) + number
+    places[every, moved] = (share[:, None] @ places)[:, 0]
     rest = np.setdiff1d(np.arange(len(cells.triangles)), of)
     whole = np.append(rest, of)
     finer = joined(
@@ -319,18 +361,13 @@ def _split(cells: Cells, at: Index, t: Array) -> tuple[Cells, Index]:
 
     No triangle has two of these sides. Also returned is what `_with_parts` does.
     """
-    order = np.argsort(at)
+    rank, new = np.argsort(at), cells.points(at, t)[0]
     owner, local = np.nonzero(np.isin(cells.sides, at))
-    number = order[np.searchsorted(at[order], cells.sides[owner, local])]
-    corner = (local[:, None] + np.arange(3)) % 3  # from the opposite one
-    triangles, places = (x[owner[:, None], corner] for x in (cells.triangles, cells.barycentric))
-    share = np.where(cells.backward[owner, local], 1 - t[number], t[number])[:, None]
-    between = (1 - share) * places[:, 1] + share * places[:, 2]
-    triangles, places = (np.stack([x, x]) for x in (triangles, places))
-    triangles[[0, 1], :, [2, 1]] = len(cells.vertices) + number
-    places[[0, 1], :, [2, 1]] = between
-    new, of = cells.points(at, t)[0], np.tile(owner, 2)
-    return _with_parts(cells, new, of, triangles.reshape(-1, 3), places.reshape(-1, 3, 3))
+    number = rank[np.searchsorted(at[rank], cells.sides[owner, local])]
+    t = np.where(cells.backward[owner, local], 1 - t[number], t[number])
+    order, share = (local[:, None] + np.arange(3)) % 3, np.column_stack([0 * t, 1 - t, t])
+    both, moved = np.tile(np.arange(len(owner)), 2), np.repeat([2, 1], len(owner))
+    return _with_parts(cells, owner[both], order[both], moved, number[both], share[both], new)
 
 
 def bisected(
@@ -367,19 +404,10 @@ def parted(cells: Cells, at: Index) -> tuple[Cells, Index]:
     each is or is part of.
     """
     share = np.where(cells.curved[at, None], 1.0, _lengths(cells.corners[at]))
-    share = (share / share.sum(axis=1, keepdims=True))[:, None]
-    triangles = np.repeat(cells.triangles[at, None], 3, axis=1)
-    places = np.repeat(cells.barycentric[at, None], 3, axis=1)
-    corner = np.arange(3)
-    triangles[:, corner, corner] = len(cells.vertices) + np.arange(len(at))[:, None]
-    places[:, corner, corner] = share @ cells.barycentric[at]
-    return _with_parts(
-        cells,
-        (share @ cells.corners[at])[:, 0],
-        np.repeat(at, 3),
-        triangles.reshape(-1, 3),
-        places.reshape(-1, 3, 3),
-    )
+    share /= share.sum(axis=1, keepdims=True)
+    new, number = (share[:, None] @ cells.corners[at])[:, 0], np.repeat(np.arange(len(at)), 3)
+    order, moved = np.tile([0, 1, 2], (len(number), 1)), np.tile([0, 1, 2], len(at))
+    return _with_parts(cells, at[number], order, moved, number, share[number], new)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
@@ -393,8 +421,8 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     carry something, `held` (k,) those on which the whole displacement is prescribed.
     """
     loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
-    loads[cells.ends[~cells.inner & np.isin(cells.segment, loaded)]] = True
-    supports[cells.ends[~cells.inner & np.isin(cells.segment, held)]] = True
+    loads[cells.ends[cells.sides_on(loaded)]] = True
+    supports[cells.ends[cells.sides_on(held)]] = True
     side, end = np.repeat(np.arange(len(cells.ends)), 2), np.tile([0, 1], len(cells.ends))
     vertex = cells.ends.ravel()
     line = cells.points(side, end.astype(float))[1] @ np.array([1.0, 1j])

@@ -11,7 +11,7 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
@@ -23,8 +23,8 @@ from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, numbers, varies
 from ...qp import vanishing_combinations
-from .cells import Cells, Places, places
-from .polynomials import CORNERS, balancing, coordinates, projected, scalars, stresses
+from .cells import Cells, Places, alike, places
+from .polynomials import CORNERS, balancing, coordinates, edges, projected, scalars, stresses
 
 TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
 CURVED_DEGREES = 2  # degrees by which stresses on triangles with a curved side are higher
@@ -48,18 +48,35 @@ def to_traction(normal: Array, components: int) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Basis:
+    """Stresses T c + s_p on b triangles, without the hoop's part of radial forces."""
+
+    degree: int  # of T
+    force_degree: int  # of the body force that s_p balances
+    axial: bool  # whether the model is axisymmetric
+    on_axis: bool  # whether a side of each lies on the axis
+    corners: Array  # (b, 3, 2) lengths
+    force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
+
+    def part(self, rows: Index | slice) -> Basis:
+        """That of the triangles `rows` (r,)."""
+        return replace(self, corners=self.corners[rows], force=self.force[rows])
+
+    def at(self, local: Array) -> tuple[tuple[Array, Array], Array]:
+        """T as of `stresses`, and s_p (b, q, v), at (a, b) `local` (b, q, 2), or (q, 2) in each."""
+        x = self.corners[:, 1:2] + local @ edges(self.corners).transpose(0, 2, 1)
+        s_p = balancing(self.force_degree, self.corners, x, self.force, self.axial)
+        return stresses(self.degree, self.corners, local, self.axial, self.on_axis), s_p
+
+
+@dataclass(frozen=True, eq=False)
 class Element:
     """Condensed triangles of one kind: b triangles, v Voigt components, d multipliers on each."""
 
     places: Places  # quadrature points, q in each
-    corners: Array  # (b, 3, 2) lengths
-    degree: int  # of the stresses
-    force_degree: int  # of the body force that s_p balances
-    axial: bool  # whether the model is axisymmetric
-    on_axis: bool  # whether a side of each lies on the axis
+    basis: Basis
     compliance: Array  # (b, q, v, v) C^-1, or (b, 1, v, v) where it is one matrix for each
     strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
-    force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
     missed: Array  # (b,) L2 norm of what of the body force s_p does not balance, times the measure
     modulus: Array  # (b,) smallest eigenvalue of C in Mandel's scaling, a stress
     combined: Array  # (b, n, m) T from the n polynomials of `stresses`, orthonormal: (T, T) = 1
@@ -76,12 +93,16 @@ class Element:
         mine = np.flatnonzero(own[some] == at)
         return mine, some[mine]
 
-    def part(self, rows: Index, at: Index, dofs: Index) -> Element:
-        """Its triangles `rows` (r,), `at` (r,) of other cells, with multipliers `dofs` (r, d)."""
-        places = {k: getattr(self.places, k)[rows] for k in ("x", "slopes", "weight", "reference")}
-        names = "corners compliance strain force missed modulus combined N own g beyond".split()
-        arrays = {name: getattr(self, name)[rows] for name in names}
-        return replace(self, places=replace(self.places, at=at, **places), dofs=dofs, **arrays)
+    def part(self, rows: Index, cells: Cells, at: Index, mu: Multipliers) -> Element:
+        """Its triangles `rows` (r,), which are `at` (r,) of other `cells`, with multipliers mu."""
+        names = "compliance strain missed modulus combined N own g beyond".split()
+        return replace(
+            self,
+            places=self.places.part(rows, cells, at),
+            basis=self.basis.part(rows),
+            dofs=mu.of(cells.sides[at])[0].reshape(len(at), -1),
+            **{name: getattr(self, name)[rows] for name in names},
+        )
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
@@ -93,25 +114,23 @@ class Element:
 
     def of_strain(self, strain: Array) -> Element:
         """These triangles for a displacement of `strain` (b, q, v), without body forces."""
-        local = coordinates(self.corners, self.places.x)
-        T = stresses(self.degree, self.corners, local, self.axial, self.on_axis)
+        basis = replace(self.basis, force=np.zeros_like(self.basis.force))
+        T, _ = basis.at(self.places.affine)
         rows, rest = _weighted(T, self.places.weight, self.compliance, strain)
         g, beyond = _nearest(rows, self.combined, rest)
-        none = {name: np.zeros_like(getattr(self, name)) for name in ("force", "missed", "own")}
-        return replace(self, strain=strain, g=g, beyond=beyond, **none)
+        none = {name: np.zeros_like(getattr(self, name)) for name in ("missed", "own")}
+        return replace(self, basis=basis, strain=strain, g=g, beyond=beyond, **none)
 
-    def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """Stresses (b, q, v) at `x` (b, q, 2) in `some` (b,) of the n triangles, or in all.
+    def stress(self, c: Array, local: Array, some: Index | slice = slice(None)) -> Array:
+        """Stresses (k, q, v) in `some` (k,) of the triangles or in all, of coefficients `c` (b, m).
 
-        `c` (n, m) are the coefficients in all; the hoop's part of radial forces is left out.
+        At (a, b) `local` (k, q, 2), or (q, 2) in each.
         """
-        corners = self.corners[some]
-        A, P = stresses(self.degree, corners, coordinates(corners, x), self.axial, self.on_axis)
-        c = (self.combined @ c[..., None])[some]
-        s = (A @ (P.reshape(len(c), -1, P.shape[-1]) @ c).reshape(*P.shape[:-1], 1))[..., 0]
-        if self.force.any():
-            s = s + balancing(self.force_degree, corners, x, self.force[some], self.axial)
-        return np.asarray(s)
+        (A, P), s_p = self.basis.part(some).at(local)
+        c = self.combined[some] @ c[some][..., None]
+        *_, k, m = P.shape
+        s = A @ (P.reshape(*P.shape[:-3], -1, m) @ c).reshape(len(c), -1, k, 1)
+        return np.asarray(s[..., 0] + s_p)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +146,7 @@ class Stress:
         for e, c in zip(self.elements, self.coefficients, strict=True):
             mine, some = e.among(at)
             if mine.size:
-                found[mine] = e.stress(c, x[mine], some)
+                found[mine] = e.stress(c, coordinates(e.basis.corners[some], x[mine]), some)
         return found
 
     def tractions(self, at: Index, x: Array, normal: Array) -> Array:
@@ -151,8 +170,8 @@ class Stress:
         """
         pairs = list(zip(self.elements, self.coefficients, strict=True))
         squares = [((c - e.g) ** 2).sum(axis=1) + e.beyond for e, c in pairs]
-        middles = ((e.corners + np.roll(e.corners, 1, axis=1)) / 2 for e in self.elements)
-        sizes = [np.abs(e.stress(c, x)).max() for (e, c), x in zip(pairs, middles, strict=True)]
+        middles = (CORNERS + np.roll(CORNERS, 1, axis=0)) / 2
+        sizes = [np.abs(e.stress(c, middles)).max() for e, c in pairs]
         return np.sqrt(by_triangle(self.elements, squares)), float(max(sizes, default=0.0))
 
 
@@ -191,7 +210,7 @@ def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
     """
     pairs = [pair for pair in problem.contact if pair.direction is None]
     names = [name for pair in pairs for name in pair.sides]
-    side = np.tile(np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names))), 2)
+    side = np.tile(cells.sides_on(cells.trace.segments(*names)), 2)
     segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
     off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
     higher = cells.curved.copy()
@@ -239,9 +258,8 @@ def elements_of(
     mu, data = multipliers(problem, cells, degree), BodyData.of(problem, cells.trace.mesh)
     highest = mu.degree[cells.sides].max(axis=1)
     varying = data.varies[cells.bodies]
-    key = np.column_stack([mu.of_stress, highest, cells.on_axis, cells.curved, varying])
-    kinds, number = np.unique(key, axis=0, return_inverse=True)
-    strain, found, rest = elastic_strain(problem, displacement), [], np.ones(len(key), dtype=bool)
+    kind = [mu.of_stress, highest, cells.on_axis, cells.curved, varying]
+    strain, found, rest = elastic_strain(problem, displacement), [], np.ones(len(highest), bool)
     for other, multipliers_, elements in known:
         both = (_identity(other, multipliers_), _identity(cells, mu))
         _, first, same = np.unique(
@@ -252,13 +270,10 @@ def elements_of(
         for e in elements:
             at, rows = e.among(before)
             if at.size:
-                found.append(e.part(rows, at, mu.of(cells.sides[at])[0].reshape(len(at), -1)))
-    number = np.where(rest, number.ravel(), -1)
-    for kind, own_degree in enumerate(kinds[:, 0]):
-        every = np.flatnonzero(number == kind)
-        for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // BATCH_ENTRIES):
-            if at.size:
-                found.append(_element(data, cells, strain, mu, at))
+                found.append(e.part(rows, cells, at, mu))
+    for (n, *_), every in alike(kind, np.flatnonzero(rest)):
+        for at in np.array_split(every, 1 + len(every) * (n + 2) ** 4 // BATCH_ENTRIES):
+            found.append(_element(data, cells, strain, mu, at))
     return mu, found
 
 
@@ -293,10 +308,11 @@ class BodyData:
             where([*problem.varying, *forces]),
         )
 
-    def compliance(self, cells: Cells, points: Places) -> Array:
+    def compliance(self, points: Places) -> Array:
         """C^-1 at places, (b, q, v, v) or, where laws are numbers in all bodies, (b, 1, v, v)."""
+        cells = points.cells
         if self.law_varies[cells.bodies[points.at]].any():
-            C = points.evaluate(cells, self.stiffness)
+            C = points.evaluate(self.stiffness)
         else:
             middle = np.full((len(points.at), 2), 1 / 3)
             C = cells.evaluate(self.stiffness, points.at, middle)[:, None]
@@ -304,17 +320,15 @@ class BodyData:
         return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
 
-def projection(
-    force: ng.CoefficientFunction, cells: Cells, points: Places, degree: int
-) -> tuple[Array, Array]:
+def projection(force: ng.CoefficientFunction, points: Places, degree: int) -> tuple[Array, Array]:
     """Polynomials (b, m, 2) of a `degree`, as of `scalars`, near to a force in b triangles.
 
     And L2 norms (b,) of what they miss, times the measure; axially about an axis.
     """
-    P, values = scalars(degree, cells.corners[points.at], points.x), points.evaluate(cells, force)
+    P, values = scalars(degree, points.corners, points.x), points.evaluate(force)
     found = projected(P, points.weight, values)
-    weight = points.weight * cells.measure(points.x)
-    axial = cells.trace.model.extent
+    weight = points.weight * points.cells.measure(points.x)
+    axial = points.cells.trace.model.extent
     missed, size = (
         np.sqrt((weight * (x[..., axial:] ** 2).sum(axis=2)).sum(axis=1))
         for x in (values - P @ found, values)
@@ -326,30 +340,20 @@ def _element(
     data: BodyData, cells: Cells, strain_of: ng.CoefficientFunction, mu: Multipliers, at: Index
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed, for a strain."""
-    degree, on_axis = int(mu.of_stress[at[0]]), bool(cells.on_axis[at[0]])
-    axial, curved = cells.trace.model.extent > 0, bool(cells.curved[at[0]])
-    varying, source = bool(data.varies[cells.bodies[at]].any()), data.force
-    points = places(cells, at, 2 * degree + 4 * (curved or axial or varying))
-    corners = cells.corners[at]
-    local = coordinates(corners, points.x) if curved else points.local
-    compliance, strain = data.compliance(cells, points), points.evaluate(cells, strain_of)
+    degree, axial = int(mu.of_stress[at[0]]), cells.trace.model.extent > 0
+    higher = cells.curved[at[0]] or axial or data.varies[cells.bodies[at]].any()
+    points = places(cells, at, 2 * degree + 4 * bool(higher))
+    compliance, strain = data.compliance(points), points.evaluate(strain_of)
     n = max(0, degree - 1 - axial)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
     hoop = np.zeros(points.weight.shape)
-    if source is not None:
-        force, missed = projection(source, cells, points, n)
+    if data.force is not None:
+        force, missed = projection(data.force, points, n)
         if axial:
             force[..., 0] = 0.0
-            hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
-
-    def columns(x: Array, local: Array) -> tuple[tuple[Array, Array], Array]:
-        """T as of `stresses` and s_p (b, q, v) at `x` (b, q, 2), by (a, b) `local` (b, q, 2)."""
-        s_p = np.zeros((*x.shape[:2], 3 + axial))
-        if force.any():
-            s_p = balancing(n, corners, x, force, axial)
-        return stresses(degree, corners, local, axial, on_axis), s_p
-
-    T, s_p = columns(points.x, local)
+            hoop = points.x[..., 0] * points.evaluate(data.force)[..., 0]
+    basis = Basis(degree, n, axial, bool(cells.on_axis[at[0]]), points.corners, force)
+    T, s_p = basis.at(points.affine)
     if axial:
         s_p[..., 2] += hoop
     rest = strain - (compliance @ s_p[..., None])[..., 0]
@@ -358,17 +362,12 @@ def _element(
     g, beyond = _nearest(rows, combined, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
-    N, own, dofs = _moments(cells, mu, at, columns)
+    N, own, dofs = _moments(cells, mu, at, basis)
     return Element(
         places=points,
-        corners=corners,
-        degree=degree,
-        force_degree=n,
-        axial=axial,
-        on_axis=on_axis,
+        basis=basis,
         compliance=compliance,
         strain=strain,
-        force=force,
         missed=missed,
         modulus=1 / largest,
         combined=combined,
@@ -407,33 +406,31 @@ def _nearest(rows: Array, combined: Array, rest: Array) -> tuple[Array, Array]:
     return g[:, 0], (rest**2).sum(axis=(1, 2))
 
 
-def _moments(
-    cells: Cells,
-    mu: Multipliers,
-    at: Index,
-    columns: Callable[[Array, Array], tuple[tuple[Array, Array], Array]],
-) -> tuple[Array, Array, Index]:
+def _moments(cells: Cells, mu: Multipliers, at: Index, basis: Basis) -> tuple[Array, Array, Index]:
     """Moments of tractions with the multipliers of triangles `at` (b,), and their numbers (b, d).
 
-    Those (b, n, d) of the first `columns` of stresses, and those (b, d) of the other.
+    Those (b, n, d) of T, and those (b, d) of s_p.
     """
-    found, degree = [], int(mu.of_stress[at[0]])
     number, there = mu.of(cells.sides[at])
-    dofs, there = number.reshape(len(at), -1), there.reshape(len(at), -1)
-    k = dofs.shape[1] // 6 - 1  # the highest degree of a side
-    axial, corners = cells.trace.model.extent > 0, cells.corners[at]
+    k, found = number.shape[2] // 2 - 1, []  # the highest degree of a side
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]
         bent = bool(cells.bent[side[0]])
-        t, w = gauss(degree + k + 2 * axial + 4 * cells.trace.geometry_order * bent)
-        own = np.where(back[:, None], 1 - t, t)
+        t, w = gauss(basis.degree + k + 2 * basis.axial + 4 * cells.trace.geometry_order * bent)
         x, dx = cells.around(at, i, t)
         local = CORNERS[i - 2] + t[:, None] * (CORNERS[i - 1] - CORNERS[i - 2])
-        (A, P), s_p = columns(x, coordinates(corners, x) if bent else local)
+        (A, P), s_p = basis.at(coordinates(basis.corners, x) if bent else local)
         n = to_traction(dx @ CLOCKWISE, s_p.shape[2])  # times ds / dt
-        chi = ((w * cells.measure(x))[..., None] * traces(k, own))[:, None]
-        parts = ((n @ A) @ P, n @ s_p[..., None])
-        traction = np.concatenate(parts, axis=3).transpose(0, 2, 3, 1)
-        found += [*(traction @ chi).swapaxes(0, 1)]
-    N = np.concatenate(found, axis=2) * there[:, None]
-    return N[:, :-1], N[:, -1], dofs
+        weight, chi = w * cells.measure(x), traces(k, t)
+        signs = np.where(back[:, None], (-1.0) ** np.arange(k + 1), 1.0)  # of chi at 1 - t
+        both = np.empty((len(at), P.shape[-1] + 1, 2, k + 1))
+        if P.ndim == 3:  # n and A are one on a side, P on all triangles
+            table = np.tensordot(P * w[:, None, None], chi, (0, 0))
+            both[:, :-1] = np.tensordot(n[:, 0] @ A[:, 0], table, 1).swapaxes(1, 2)
+        else:
+            both[:, :-1] = (((n @ A) @ P) * weight[..., None, None]).transpose(0, 3, 2, 1) @ chi
+        both[:, -1] = ((n @ s_p[..., None])[..., 0] * weight[..., None]).swapaxes(1, 2) @ chi
+        both *= there[:, i].reshape(-1, 1, 2, k + 1) * signs[:, None, None]
+        found.append(both.reshape(*both.shape[:2], -1))
+    N = np.concatenate(found, axis=2)
+    return N[:, :-1], N[:, -1], number.reshape(len(at), -1)

@@ -236,7 +236,7 @@ def facing_middles(
     """Sides (k,) on which p* may act, those (k,) they face, and there their middles, (k,)."""
     found = [(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp), np.zeros(0))]
     for support in supports:
-        side = np.flatnonzero(np.isin(cells.segment, support.segments))
+        side = cells.sides_on(support.segments)
         place = cells.on_side(side, np.array([[0.5]]))
         there = opposite_points(cells.trace, displacement, support.pair, *place)
         faces = there.segment[:, 0] >= 0
@@ -321,7 +321,7 @@ def facing_sides(
     """
     pair, trace, line = reach.pair, cells.trace, reach.pair.line
     contact, (of_pressure, degree) = line.contact, degrees
-    every = np.flatnonzero(np.isin(cells.segment, reach.segments))
+    every = cells.sides_on(reach.segments)
     t = np.concatenate([[INSIDE_SIDE], POINTS, [1 - INSIDE_SIDE]])
     found = opposite_points(trace, displacement, pair, *cells.on_side(every, t[None]))
     faces = found.faces[:, 1:-1]

@@ -57,7 +57,7 @@ def force_bar(
         )
     problem = proof.problem
     strain = model_of(problem).strain(G)
-    elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in dual.elements]
+    elements = [e.of_strain(e.places.evaluate(strain)) for e in dual.elements]
     given = replace(dual.given, loads=np.zeros_like(dual.given.loads))
     moments = np.zeros_like(dual.moments)
     test = replace(dual, given=given, elements=elements, moments=moments)
@@ -83,7 +83,7 @@ def force_bar(
     pressed = zip(lines, stress.pressure, r, strict=True)
     opened = sum(float((f.force(p) * opening).sum()) for f, p, opening in pressed)
     crossed = float((stress.distance + stress.loads) @ w)
-    on_motions = stress.free_force and stress.free_force * largest(elements, cells, G)
+    on_motions = stress.free_force and stress.free_force * largest(elements, G)
     return error + abs(t.work) + crossed + abs(opened) + on_motions
 
 
@@ -139,8 +139,7 @@ def _beside(
     """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
     if f.pair is None:
         return 0.0
-    trace, segment = cells.trace, cells.segment
-    side = np.setdiff1d(np.flatnonzero(np.isin(segment, f.pair.line.segments)), f.side)
+    trace, side = cells.trace, np.setdiff1d(cells.sides_on(f.pair.line.segments), f.side)
     place = cells.on_side(side, POINTS[None])
     found = opposite_points(trace, displacement, f.pair, *place)
     values, _ = jump(trace, G, place, (found.segment, found.s))

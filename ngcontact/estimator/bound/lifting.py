@@ -17,16 +17,15 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index, from_triplets
+from ...arrays import Array, Index
 from ...errors import ContactError
 from ...lagrange import gauss_lobatto, lagrange
-from ...linalg import cholesky, lower_half
+from ...linalg import assembled, cholesky, congruent, handed_over, shared
 from ...problem import Problem
-from .cells import Cells, places
+from .cells import Cells, alike, places
 from .elements import BATCH_ENTRIES, BodyData
 from .facing import DATA_DEGREE, POINTS, TO_LOBATTO, FacingSides, at_places
 from .polynomials import CORNERS, DERIVATIVES, derivatives
-from .tractions import BoundaryData
 
 SIDE_DEGREES = 3  # steps from `DATA_DEGREE` down, by which degrees on sides may differ
 # By so much, or by less than `LIFTING_NOISE` makes noise, polynomials on sides may miss the largest
@@ -47,14 +46,15 @@ class Prescribed:
 
 
 def prescribed_on_supports(
-    cells: Cells, given: BoundaryData, displacement: ng.CoefficientFunction
+    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction
 ) -> list[Prescribed]:
     """u_D - u_h in each prescribed component; no radial motion on the axis."""
     trace, found, j = cells.trace, [], DATA_DEGREE + 1
     axis = np.flatnonzero(trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1))
     along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
     found.append(Prescribed(axis, along, np.zeros((len(axis), j))))
-    for values, side in given.supports:
+    for name, values in problem.displacement.items():
+        side = cells.sides_on(trace.segments(name))
         place = cells.on_side(side, gauss_lobatto(DATA_DEGREE)[None])
         u = at_places(partial(trace.evaluate, displacement), *place)
         for c, value in enumerate(values):
@@ -73,43 +73,28 @@ def lifted(
     degree: int,
     extent: float,
 ) -> Array:
-    """Norms (n,) of w, roots of energies per thickness, which opens the gaps of lines by r.
+    """Norms (n,) of w, roots of energies per thickness, with what is asked for at supports and r.
 
-    Both bodies take their shares of -r and r. `prescribed` are the conditions on supports, `lines`
-    (k, j) the facing sides with r, lengths at Gauss points; the rest is as of `lifting_of`.
-    """
-    every = list(prescribed)
-    for line, r in lines:
-        start, stop = line.share.T[:, :, None]
-        share = start + (stop - start) * POINTS
-        d = np.einsum("ij,kjc->kic", TO_LOBATTO, line.direction)
-        every.append(Prescribed(line.side, d, -(share * r) @ TO_LOBATTO.T))
-        if (share < 1).any():
-            both = np.concatenate([line.direction, ((1 - share) * r)[..., None]], axis=2)
-            there = TO_LOBATTO @ line.on_primary(both)
-            every.append(Prescribed(line.other, there[..., :2], there[..., 2]))
-    away = [side for line, _ in lines for side in line.slots]
-    return lifting_of(problem, cells, every, degree, extent, away)
-
-
-def lifting_of(
-    problem: Problem,
-    cells: Cells,
-    prescribed: Sequence[Prescribed],
-    degree: int,
-    extent: float,
-    away: Sequence[int] = (),
-) -> Array:
-    """Norms (n,) of w with all that is `prescribed`, of a `degree`, or more on sides that need it.
-
-    Amounts below round-off of the `extent` of displacements and gaps, a length, are not lifted.
-    Sides `away` (r,) of Gamma_K face nothing, and may move.
+    `prescribed` are the conditions on supports, `lines` (k, j) the facing sides with r, lengths at
+    Gauss points, of which both bodies take their shares. w is of a `degree`, or more on sides that
+    need it. Amounts below round-off of the `extent` of displacements and gaps, a length, are not
+    lifted.
 
     Raises
     ------
     ContactError
         Conditions at a vertex require different displacements.
     """
+    prescribed = list(prescribed)
+    for line, r in lines:
+        start, stop = line.share.T[:, :, None]
+        share = start + (stop - start) * POINTS
+        d = np.einsum("ij,kjc->kic", TO_LOBATTO, line.direction)
+        prescribed.append(Prescribed(line.side, d, -(share * r) @ TO_LOBATTO.T))
+        if (share < 1).any():
+            both = np.concatenate([line.direction, ((1 - share) * r)[..., None]], axis=2)
+            there = TO_LOBATTO @ line.on_primary(both)
+            prescribed.append(Prescribed(line.other, there[..., :2], there[..., 2]))
     norms, degrees = np.zeros(len(cells.triangles)), np.full(len(cells.ends), degree)
     largest = [np.abs(one.amount).max(axis=1, initial=0.0) for one in prescribed]
     least, each = LIFTING_NOISE * extent, zip(prescribed, largest, strict=True)
@@ -120,9 +105,11 @@ def lifting_of(
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     count = np.bincount(cells.sides[layer].ravel(), minlength=len(cells.ends))
-    lines = [name for pair in problem.contact for name in pair.sides]
-    fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
-    fixed[np.asarray(away, dtype=np.intp)] = False
+    touching = [name for pair in problem.contact for name in pair.sides]
+    fixed = cells.inner
+    fixed[cells.sides_on(cells.trace.segments(*touching))] = True
+    for line, _ in lines:  # what faces nothing may move
+        fixed[line.slots] = False
     unit = np.concatenate(largest).max()
     error = max(AMOUNT_ERROR, least / unit)
     for one in prescribed:
@@ -130,9 +117,7 @@ def lifting_of(
         both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
         asked = np.full(len(both), DATA_DEGREE)
         for n in (*range(DATA_DEGREE - SIDE_DEGREES, degree, -SIDE_DEGREES), degree):
-            carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
-            lower = lagrange(n, gauss_lobatto(DATA_DEGREE)) @ carry
-            asked[(np.abs(both - lower @ both) <= error).all(axis=(1, 2))] = n
+            asked[(np.abs(both - _reduced(n)[1] @ both) <= error).all(axis=(1, 2))] = n
         degrees[one.side] = np.maximum(degrees[one.side], asked)
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
     nodes = np.unique(np.concatenate([own.ravel() for _, own, _ in stiffness]))
@@ -141,7 +126,7 @@ def lifting_of(
     for one in prescribed:
         for n in np.unique(degrees[one.side]).tolist():
             some = (count[one.side] > 0) & (degrees[one.side] == n)
-            carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
+            carry, _ = _reduced(n)
             d = (carry @ one.direction[some]).reshape(-1, 2)
             length = np.linalg.norm(d, axis=1, keepdims=True)
             number = np.searchsorted(nodes, _on_sides(cells, one.side[some], n)).ravel()
@@ -163,17 +148,14 @@ def lifting_of(
     first = [2 * np.searchsorted(nodes, own) for _, own, _ in stiffness]
     dofs = [np.concatenate([x, x + 1], axis=1) for x in first]
     if not held.all():
-        K = from_triplets(
-            np.concatenate([part.ravel() for *_, part in stiffness]),
-            np.concatenate([np.repeat(x, x.shape[1], axis=1).ravel() for x in dofs]),
-            np.concatenate([np.tile(x, (1, x.shape[1])).ravel() for x in dofs]),
-            (w.size, w.size),
-        )
-        R = sp.bsr_array((V, np.arange(len(nodes)), np.arange(len(nodes) + 1)))
-        Z = sp.csr_array(R.tocsc()[:, np.flatnonzero(~held)])
-        A = (Z.T @ K @ Z).tocsr()
-        y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
-        w += (Z @ y).reshape(-1, 2)
+        blocks = [(x, part) for x, (*_, part) in zip(dofs, stiffness, strict=True)]
+        matrix = assembled(blocks, w.size)
+        K, node = shared(matrix), np.arange(len(nodes) + 1)
+        R = sp.bsr_array((V, node[:-1], node)).tocsr()
+        R.eliminate_zeros()
+        load = np.where(held.ravel(), 0.0, -(R.T @ (K @ w.ravel())))
+        y = cholesky(handed_over(congruent(matrix, K, R)[0]))(~held.ravel())(load)
+        w += (R @ y).reshape(-1, 2)
     still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
     for (at, _, part), x in zip(stiffness, dofs, strict=True):
         own = w.ravel()[x].reshape(len(x), 2, -1)
@@ -182,6 +164,13 @@ def lifting_of(
         square = ((part @ own[..., None])[..., 0] * own).sum(axis=1)
         norms[at] = np.sqrt(np.maximum(square, 0.0))
     return norms
+
+
+@lru_cache
+def _reduced(n: int) -> tuple[Array, Array]:
+    """From values at j Gauss-Lobatto points to those of degree n (n + 1, j), and back (j, j)."""
+    carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
+    return carry, lagrange(n, gauss_lobatto(DATA_DEGREE)) @ carry
 
 
 def _on_sides(cells: Cells, side: Index, n: int) -> Index:
@@ -198,25 +187,23 @@ def _stiffness(
     For polynomials of a `degree`, on the sides of `degrees` (e,); x components come first.
     """
     data = BodyData.of(problem, cells.trace.mesh)
-    varying = data.law_varies[cells.bodies]
-    key = np.column_stack([degrees[cells.sides], cells.curved, varying])[layer]
-    kinds, kind = np.unique(key, axis=0, return_inverse=True)
-    for k, (*own, bent, _) in enumerate(kinds.tolist()):
-        every, (places_, inverse) = layer[kind.ravel() == k], _nodes(degree, *own)
-        order, m = 2 * max(own) + 4 * bent, len(places_)
+    kind = [degrees[cells.sides], cells.curved, data.law_varies[cells.bodies]]
+    for (*own, bent, _), every in alike(kind, layer):
+        inverse = _nodal(degree, *own)
+        order, m = 2 * max(own) + 4 * bent, len(inverse)
         for at in np.array_split(every, 1 + len(every) * order**2 * m // BATCH_ENTRIES):
             points = places(cells, at, order)
             f, *by = np.moveaxis(_functions(degree, own, points.local) @ inverse, 1, 0)
             into = np.linalg.inv(points.slopes)
             gradient = into.swapaxes(2, 3) @ np.stack(by, axis=1)
-            C = np.linalg.inv(data.compliance(cells, points))
+            weight = points.weight[..., None, None]
+            C = weight * np.linalg.inv(data.compliance(points))
             B = np.zeros((*points.weight.shape, C.shape[-1], 2 * m))  # Voigt
             B[:, :, 0, :m] = B[:, :, -1, m:] = gradient[:, :, 0]
             B[:, :, 1, m:] = B[:, :, -1, :m] = gradient[:, :, 1]
             if B.shape[2] > 3:
                 B[:, :, 2, :m] = f / points.x[..., :1]
-            weight = points.weight[..., None, None]
-            stress, strain = (x.reshape(len(at), -1, 2 * m) for x in (weight * (C @ B), B))
+            stress, strain = (x.reshape(len(at), -1, 2 * m) for x in (C @ B, B))
             on = [_on_sides(cells, cells.sides[at, i], n)[:, 1:-1] for i, n in enumerate(own)]
             back = cells.backward[at]
             on = [np.where(back[:, i, None], x[:, ::-1], x) for i, x in enumerate(on)]
@@ -228,16 +215,16 @@ def _stiffness(
 
 
 @lru_cache
-def _nodes(degree: int, *own: int) -> tuple[Array, Array]:
-    """Nodes (m, 2) by (a, b) of the functions of `_functions`, and what makes these nodal (m, m).
+def _nodal(degree: int, *own: int) -> Array:
+    """What makes the functions of `_functions` nodal (m, m).
 
-    At corners, on the sides in turn, inside.
+    Nodes are at corners, on the sides in turn, inside.
     """
     t = [gauss_lobatto(n)[1:-1, None] for n in own]
     on = [(1 - t[i]) * CORNERS[i - 2] + t[i] * CORNERS[i - 1] for i in range(3)]
     inside = [(i / degree, j / degree) for i in range(1, degree) for j in range(1, degree - i)]
     found = np.concatenate([CORNERS, *on, np.reshape(inside, (-1, 2))])
-    return found, np.asarray(np.linalg.inv(_functions(degree, own, found)[:, 0]))
+    return np.asarray(np.linalg.inv(_functions(degree, own, found)[:, 0]))
 
 
 def _functions(degree: int, own: Sequence[int], local: Array) -> Array:

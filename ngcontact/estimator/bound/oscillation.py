@@ -19,7 +19,7 @@ import numpy as np
 from ...arrays import Array, Index
 from ...problem import Problem, numbers
 from ...quadrature import SampledElements
-from .cells import Cells, bisected, places
+from .cells import Cells, alike, bisected, places
 from .elements import Element, Multipliers, projection, traces
 from .facing import POINTS, WEIGHTS
 from .polynomials import edges
@@ -109,7 +109,7 @@ def divided(
     parent = parts[0].parent
     for e in parts[1]:
         np.minimum.at(moduli, parent[e.places.at], e.modulus)
-        np.maximum.at(degree, parent[e.places.at], e.degree)
+        np.maximum.at(degree, parent[e.places.at], e.basis.degree)
     force = cells.trace.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
     while True:
         order = np.argsort(D)
@@ -120,10 +120,10 @@ def divided(
             return cells
         cells, whole = bisected(cells, marked, linked)
         missed, new = np.zeros(len(whole)), np.flatnonzero(np.bincount(whole)[whole] > 1)
-        key = 2 * degree[cells.parent[new]] + cells.curved[new]
-        for kind in () if all(map(numbers, problem.force.values())) else np.unique(key):
-            at, n = new[key == kind], kind // 2 - 1 - cells.trace.model.extent
-            missed[at] = projection(force, cells, places(cells, at, 2 * (kind // 2) + 4), n)[1]
+        rough = new[: 0 if all(map(numbers, problem.force.values())) else None]
+        for (n, _), at in alike([degree[cells.parent], cells.curved], rough):
+            own = n - 1 - cells.trace.model.extent
+            missed[at] = projection(force, places(cells, at, 2 * n + 4), own)[1]
         given, P = boundary_data(problem, cells), traces(int(degree.min()), POINTS)
         near = P @ ((P.T * WEIGHTS) @ given.loads)
         sides = given.missed(near, (), (), float(np.abs(near).max(initial=0.0)))

@@ -136,10 +136,11 @@ def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) 
     `force` (b, m, 2) are the coefficients of the force as of `scalars`, for a `degree` and
     `corners` (b, 3, 2). About an axis only the axial part counts: s_zz = - int F_z dz.
     """
-    _, size = scales(corners)
-    c = np.einsum("cnm,bmc->bnc", _antiderivatives(degree), force)
     found = np.zeros((*x.shape[:2], 3 + axial))
-    found[..., axial:2] = -size * (scalars(degree + 1, corners, x) @ c)[..., axial:]  # (3.5)
+    if force.any():
+        _, size = scales(corners)
+        c = np.einsum("cnm,bmc->bnc", _antiderivatives(degree), force)
+        found[..., axial:2] = -size * (scalars(degree + 1, corners, x) @ c)[..., axial:]  # (3.5)
     return found
 
 

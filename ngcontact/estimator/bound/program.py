@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 
 from ...arrays import Array, Index, Mask, from_triplets
 from ...errors import ContactError
-from ...linalg import assembled, cholesky, congruent, handed_over, shared
+from ...linalg import assembled, cholesky, handed_over, shared
 from ...qp import (
     BorderedSystems,
     QuadraticProgram,
@@ -178,8 +178,9 @@ def dual_program(
     firsts = [mu.start[line.side, None] + np.arange(line.psi.shape[1]) for line in lines]
     unknown, null_space = _joined(firsts, np.intp), no_null_space(d)
     R, T = _basis(mu, lines, unknown)
-    matrix = assembled([(e.dofs, e.N.transpose(0, 2, 1) @ e.N) for e in elements], d)
-    K = congruent(matrix, shared(matrix), T)[0] if len(unknown) else shared(matrix)
+    other = abs(T - sp.eye_array(d)).sum(axis=1) > 0
+    parts = [part for e in elements for part in _of_unknowns(e, T, other)]
+    K = shared(assembled([(at, N.transpose(0, 2, 1) @ N) for at, N in parts], d))
     size = K.diagonal()
     K.setdiag((1 + DIAGONAL_SHIFT) * size)
     idle = fixed | (size <= AXIS_STIFFNESS * size.max())  # on the axis there is no traction
@@ -235,6 +236,24 @@ def _basis(
     while (part := M @ part).nnz:  # as often as bodies stand in a row
         T = T + part
     return _summed(own, (m, d)) + R, T
+
+
+def _of_unknowns(e: Element, T: sp.csr_array, other: Mask) -> list[tuple[Index, Array]]:
+    """Unknowns y (b, k) and N T (b, m, k) of triangles: of those without rows `other`, and with.
+
+    `other` (d,) are the rows of T that are not those of 1.
+    """
+    some = other[e.dofs].any(axis=1)
+    b, d = e.dofs[some].shape
+    rows = T[e.dofs[some].ravel()]
+    of, row = np.divmod(np.repeat(np.arange(b * d), np.diff(rows.indptr)), d)
+    key, place = np.unique(of * T.shape[1] + rows.indices, return_inverse=True)
+    start, end = np.searchsorted(key // T.shape[1], [np.arange(b), np.arange(1, b + 1)])
+    own = start[:, None] + np.arange((end - start).max(initial=0))
+    own = np.where(own < end[:, None], own, start[:, None])  # more have no moments
+    part = np.zeros((b, d, own.shape[1]))
+    part[of, row, place - start[of]] = rows.data
+    return [(e.dofs[~some], e.N[~some]), (key[own] % T.shape[1], e.N[some] @ part)]
 
 
 def _summed(

@@ -79,7 +79,7 @@ class EquilibratedStress:
     @property
     def degree(self) -> int:
         """Degree of its polynomials on triangles with straight sides; about an axis of r s."""
-        return min(e.degree for e in self.proof.dual.elements)
+        return min(e.basis.degree for e in self.proof.dual.elements)
 
     @property
     def triangles(self) -> Array:
@@ -194,7 +194,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         "bound": np.array(proof.bound),
     }
     # T and F, times the measure, at a lattice; by rules of quadrature e(u_h) and C^-1.
-    k = proof.dual.elements[0].degree
+    k = proof.dual.elements[0].basis.degree
     i, j = np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]).T
     lattice = (np.column_stack([i, j]) + LATTICE_INSET) / (k + 3 * LATTICE_INSET)
     share = np.column_stack([1 - lattice.sum(axis=1), lattice])
@@ -202,8 +202,8 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     T, force, measure = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape), cells.measure(x)[..., None]
     for number, (e, c) in enumerate(zip(proof.dual.elements, stress.s.coefficients, strict=True)):
         at = e.places.at
-        T[at] = e.stress(c, x[at])[..., [0, 1, -1]]
-        force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
+        T[at] = e.stress(c, share[:, [2, 0]])[..., [0, 1, -1]]
+        force[at] = scalars(e.basis.force_degree, e.basis.corners, x[at]) @ e.basis.force
         a, b = e.places.local.T
         weight = e.places.weight[0] / cells.measure(e.places.x[0])
         every, places = np.repeat(at, len(a)), e.places.reference.reshape(-1, 2)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -24,10 +23,9 @@ TRACTION_ROUND_OFF = 1e-10  # relative to the largest stress: as equilibrium is 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryData:
-    """Prescribed displacements and tractions on m sides of the boundary, at j points of each."""
+    """Tractions that are given on m sides of the boundary, at j points of each."""
 
     cells: Cells
-    supports: list[tuple[Sequence[Any], Index]]  # u_D of `Problem.displacement`, with sides (k,)
     held: Mask  # (e, 2) components with prescribed displacements: no traction is given
     side: Index  # (m,)
     weight: Array  # (m, j) of Gauss at `POINTS`, in arc length times the model's measure
@@ -117,14 +115,9 @@ def rough_places(problem: Problem, trace: BoundaryTrace) -> tuple[Index, Array]:
 
 def boundary_data(problem: Problem, cells: Cells) -> BoundaryData:
     """The conditions of a problem."""
-
-    def sides(pattern: str) -> Index:
-        return np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
-
     held = np.zeros((len(cells.ends), 2), dtype=bool)
-    supports = [(values, sides(pattern)) for pattern, values in problem.displacement.items()]
-    for values, at in supports:
-        held[at] |= [value is not None for value in values]
+    for name, values in problem.displacement.items():
+        held[cells.sides_on(cells.trace.segments(name))] |= [value is not None for value in values]
     side = np.flatnonzero(~cells.inner)
     x, dx = cells.points(side, np.tile(POINTS, (len(side), 1)))
     length, measure = np.linalg.norm(dx, axis=2), cells.measure(x)
@@ -132,7 +125,8 @@ def boundary_data(problem: Problem, cells: Cells) -> BoundaryData:
     normal[cells.backward[cells.owner[side], cells.local[side]]] *= -1
     loads = np.zeros(x.shape)
     for name in problem.traction:
-        at, load = np.searchsorted(side, sides(name)), problem.traction_vector(name)
-        loads[at] += jump(cells.trace, load, cells.on_side(side[at], POINTS[None]))[0]
+        own, load = cells.sides_on(cells.trace.segments(name)), problem.traction_vector(name)
+        values, _ = jump(cells.trace, load, cells.on_side(own, POINTS[None]))
+        loads[np.searchsorted(side, own)] += values
     weight = WEIGHTS * length * measure
-    return BoundaryData(cells, supports, held, side, weight, measure, x, normal, loads)
+    return BoundaryData(cells, held, side, weight, measure, x, normal, loads)

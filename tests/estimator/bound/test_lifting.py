@@ -13,7 +13,7 @@ from drivers.reference.westergaard import moduli
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.estimator.bound.cells import cells_of
 from ngcontact.estimator.bound.facing import DATA_DEGREE
-from ngcontact.estimator.bound.lifting import Prescribed, lifting_of
+from ngcontact.estimator.bound.lifting import Prescribed, lifted
 from ngcontact.fem import boundary_trace
 from ngcontact.lagrange import gauss_lobatto
 from tests.estimator.bound.test_cells import NO_CUTS, square
@@ -46,7 +46,7 @@ def whole(cells, u, v):
 
 def energy(cells, problem, asked, degree):
     """|w|^2."""
-    return float((lifting_of(problem, cells, asked, degree, 1.0) ** 2).sum())
+    return float((lifted(problem, cells, asked, [], degree, 1.0) ** 2).sum())
 
 
 @pytest.mark.parametrize(("n", "degree"), [(3, 4), (4, 5), (6, 4)])
