@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +14,6 @@ from scipy.spatial import Delaunay
 from ..arrays import Array, Index
 from ..problem import MeshArrays
 
-# Of VTK's tetrahedra, by the numbers of their vertices.
-EDGES = (0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)
-FACES = (0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)
 # Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
 VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
 # Places of the components of `full_stress` in the tensor.
@@ -39,36 +37,27 @@ class Nodes:
         return np.stack([np.bincount(numbers, column) / count for column in found.T], axis=1)
 
 
-def lattice(order: int) -> Index:
-    """Barycentric indices (n, 3) of the nodes of VTK's Lagrange triangle, row sums = `order`.
-
-    Corners, then the insides of the edges 01, 12, 20, then the inside, which is again such a
-    triangle of order - 3.
-    """
-    if order == 0:
-        return np.zeros((1, 3), dtype=np.intp)
-    unit, step = np.eye(3, dtype=np.intp), np.arange(1, order)[:, None]
-    edges = [(order - step) * unit[a] + step * unit[b] for a, b in ((0, 1), (1, 2), (2, 0))]
-    inside = [lattice(order - 3) + 1] if order > 2 else []
-    return np.concatenate([order * unit, *edges, *inside])
-
-
-def tetrahedron(order: int) -> Index:
-    """Barycentric indices (n, 4) of the nodes of VTK's Lagrange tetrahedron of order 1, 2 or 3.
+def lattice(order: int, dim: int) -> Index:
+    """Barycentric indices (n, dim + 1) of the nodes of VTK's Lagrange simplex, row sums = `order`.
 
     With respect to Netgen's vertices: VTK sees its tetrahedra turned inside out.
     """
-    unit, step = np.eye(4, dtype=np.intp)[[1, 0, 2, 3]], np.arange(1, order)[:, None]
-    edges = [(order - step) * unit[a] + step * unit[b] for a, b in EDGES]
-    faces = [unit[list(face)].sum(axis=0)[None] for face in FACES] if order == 3 else []
-    return np.concatenate([order * unit, *edges, *faces])
+    from vtkmodules.vtkCommonDataModel import vtkHigherOrderTetra, vtkHigherOrderTriangle
+
+    kind: Any = vtkHigherOrderTriangle if dim == 2 else vtkHigherOrderTetra
+    turned = [2, 0, 1] if dim == 2 else [0, 3, 1, 2]
+    nodes, node = [], [0] * (dim + 1)
+    for number in range(math.comb(order + dim, dim)):
+        kind.BarycentricIndex(number, node, order)  # the first vertex has the last index
+        nodes.append([node[k] for k in turned])
+    return np.array(nodes, dtype=np.intp)
 
 
 def subdivision(order: int) -> tuple[Index, Index]:
     """Small triangles (t, 3), t = order^2, and sides (3, order + 1) of a `lattice` triangle."""
     inner = np.arange(3, 3 * order).reshape(3, -1)
     sides = np.column_stack([[0, 1, 2], inner, [1, 2, 0]])
-    return Delaunay(lattice(order)[:, 1:]).simplices, sides
+    return Delaunay(lattice(order, 2)[:, 1:]).simplices, sides
 
 
 def sized(cells: Index) -> Index:
@@ -79,7 +68,7 @@ def sized(cells: Index) -> Index:
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     """Nodes of the Lagrange elements of a mesh of simplices; ``ValueError`` if it has others."""
     solid = mesh.dim == 3
-    weights = tetrahedron(order) if solid else lattice(order)
+    weights = lattice(order, mesh.dim)
     # NGSolve's reference triangle has its vertices at (1, 0), (0, 1), (0, 0), and so on in space.
     places = np.zeros((len(weights), 3))
     places[:, : mesh.dim] = weights[:, : mesh.dim] / order

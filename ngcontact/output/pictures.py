@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -54,14 +54,6 @@ FILM_DPI = 80
 FILM_HEADROOM = 1.05  # end of the scale of a film over its largest pressure
 
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
-
-
-class Scale(NamedTuple):
-    """Colour scale of a picture."""
-
-    label: str
-    extremes: tuple[float, float]  # least and largest value
-    limits: tuple[float, float]  # values at the ends of the colours
 
 
 def plot_solution(
@@ -190,28 +182,27 @@ def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
     margin = 0.03 * (high - low).max()
     ends = [part for part in map(shown_part, frames) if part is not None] or [np.zeros(2)]
     along = [np.array([np.min(ends), np.max(ends)])]
-    images = []
+    images: list[Any] = []
     for scene, title in zip(scenes, titles, strict=True):
-        figure = Figure(layout="constrained")
+        figure = Figure(layout="constrained", dpi=FILM_DPI)
         profiles = draw_scene(figure, scene, windows, limits, along)
         xlim, ylim = np.transpose([low - margin, high + margin]).tolist()
         figure.axes[0].set(xlim=xlim, ylim=ylim)
         for profile in profiles if top > 0 else ():
             profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), top)
         figure.suptitle(title)
+        if images:
+            figure.set_size_inches(*(size / FILM_DPI for size in images[0].shape[1::-1]))
         canvas = FigureCanvasAgg(figure)
-        figure.set_dpi(FILM_DPI)
         canvas.draw()
-        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
-    size = images[0].size
-    images = [image if image.size == size else image.resize(size) for image in images]
+        images.append(np.asarray(canvas.buffer_rgba())[..., :3])
     # A common palette: one stress has one colour in all frames.
-    strip = Image.fromarray(np.vstack([np.asarray(image) for image in images]))
-    colours = np.array(strip.quantize(256).getpalette() or [255] * 3).reshape(-1, 3)
+    common = Image.fromarray(np.vstack(images)).quantize(256)
+    colours = np.reshape(common.getpalette() or [255] * 3, (-1, 3))
     colours[(colours >= 240).all(axis=1)] = 255  # Pillow rounds white to a neighbour
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(colours.ravel().tolist())
-    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    common.putpalette(colours.ravel().tolist())
+    plain = Image.Dither.NONE
+    return [Image.fromarray(image).quantize(palette=common, dither=plain) for image in images]
 
 
 def _corners(scenes: Sequence[Scene]) -> Window:
@@ -329,9 +320,8 @@ def draw_scene(
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
     _draw_windows(bodies, close, windows, style.unit("length")[1])
     (label, kind, _), (_, unit) = scene.shown, style.unit(scene.shown.kind)
-    ends = float(scene.values.min()) / unit, float(scene.values.max()) / unit
-    scale = Scale(style.title(label, kind), ends, (limits[0] / unit, limits[1] / unit))
-    colour_bar(figure, shading, [bodies, *close], scale)
+    extremes = float(scene.values.min()) / unit, float(scene.values.max()) / unit
+    colour_bar(figure, shading, [bodies, *close], style.title(label, kind), extremes)
     if parts:
         _draw_pressures(pressures, scene.solution, style, parts)
     return pressures
@@ -388,26 +378,22 @@ def _draw_windows(
             bodies.annotate(str(k + 1), (right, top), **at, color="crimson", weight="bold")
 
 
-def colour_bar(figure: Figure, shading: Any, axes: list[Axes], scale: Scale) -> None:
-    """Colour bar; arrows and numbers show extremes beyond its ends."""
-    label, (least, most), (low, high) = scale
+def colour_bar(
+    figure: Figure, shading: Any, axes: list[Axes], label: str, extremes: tuple[float, float]
+) -> None:
+    """Colour bar; arrows and numbers show the `extremes`, least and largest, beyond its ends."""
+    (least, most), (low, high) = extremes, shading.get_clim()
     below, above = least < low, most > high
-    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
-    bar = figure.colorbar(
-        shading,
-        ax=axes,
-        label=label,
-        extend=extend.get((below, above), "neither"),
-    )
+    extend = ("neither", "min", "max", "both")[below + 2 * above]
+    bar = figure.colorbar(shading, ax=axes, label=label, extend=extend)
     bar.ax.ticklabel_format(axis="y", **POWERS)
     bar.formatter.set_locs(bar.get_ticks().tolist())
     power = 16 if bar.formatter.get_offset() else 0  # which stands above the bar
-    for beyond, value, word, y, offset, va in (
-        (above, most, "largest", 1.0, 14 + power, "bottom"),
-        (below, least, "least", 0.0, -14, "top"),
+    for beyond, text, y, offset, va in (
+        (above, f"largest {most:.3g}", 1.0, 14 + power, "bottom"),
+        (below, f"least {least:.3g}", 0.0, -14, "top"),
     ):
         if beyond:
-            text = f"{word} {value:.3g}"
             at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
             font: dict[str, Any] = {"ha": "center", "va": va, "fontsize": 8}
             bar.ax.annotate(text, (0.5, y), xytext=(0, offset), **at, **font)

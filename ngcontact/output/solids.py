@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, Index
+from ..arrays import Array
 from ..solved import Solved
 from .files import check_path
-from .nodes import EDGES, FACES, VTK_CELLS, nodes_of, sized
+from .nodes import VTK_CELLS, nodes_of, sized
 from .pictures import (
     COLOURS,
     DIVERGING,
     POWERS,
     SEQUENTIAL,
-    Scale,
     colour_bar,
     colour_limits,
     finish_pressures,
@@ -159,22 +158,22 @@ def _symmetry_planes(solution: Solved, slack: float) -> list[tuple[Array, Array]
     return found
 
 
-def _grid(solution: Solved, style: Style) -> tuple[pyvista.UnstructuredGrid, Index, float]:
+def _grid(
+    solution: Solved, style: Style
+) -> tuple[pyvista.UnstructuredGrid, pyvista.PolyData, float]:
     """Deformed bodies with the field as point data "shown", edges on their surface, the scale."""
     import pyvista
+    from vtkmodules.vtkFiltersGeometry import vtkUnstructuredGridGeometryFilter
 
     order, shown = max(solution.mesh.GetCurveOrder(), solution.order), style.shown(solution)
     nodes = nodes_of(solution.mesh, order)
     _, moved, scale = moved_nodes(solution, nodes, style)
-    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][order - 1]: nodes.cells}, moved)
+    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][min(order, 3) - 1]: nodes.cells}, moved)
     grid.point_data["shown"] = shown.values(nodes) / style.unit(shown.kind)[1]
-    faces = np.sort(nodes.cells[:, FACES], axis=2).reshape(-1, 3)
-    _, same, count = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
-    outside = (count[same.ravel()] == 1).reshape(-1, 4, 1)
-    belongs = np.array([[set(edge) <= set(face) for edge in EDGES] for face in FACES])
-    inner = 4 + np.arange(6 * (order - 1)).reshape(6, order - 1)
-    local = np.column_stack([np.array(EDGES)[:, 0], inner, np.array(EDGES)[:, 1]])
-    return grid, nodes.cells[:, local][(outside & belongs).any(axis=1)], scale
+    outside = vtkUnstructuredGridGeometryFilter()
+    outside.SetInputData(grid)
+    outside.Update()
+    return grid, pyvista.wrap(outside.GetOutput()).extract_all_edges(), scale
 
 
 def _draw_bodies(
@@ -186,8 +185,8 @@ def _draw_bodies(
     from matplotlib.colors import Normalize
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
-    (grid, lines, scale), shown = _grid(solution, style), style.shown(solution)
-    edges, ends = pyvista.PolyData(grid.points, lines=sized(lines)), grid.get_data_range("shown")
+    (grid, edges, scale), shown = _grid(solution, style), style.shown(solution)
+    ends = grid.get_data_range("shown")
     normals = [cut.normal for cut in zone.cuts] if zone else [FRONT]
     if zone and not zone.cuts[0].symmetry:
         grid, edges = (
@@ -231,10 +230,9 @@ def _draw_bodies(
         parts[name].set_axis_off()
         parts[name].set_title(title)
     there = [parts[name] for name in "bc" if name in parts]
-    colouring = Scale(
-        style.title(shown.label, shown.kind), (float(values.min()), float(values.max())), limits
-    )
-    colour_bar(figure, ScalarMappable(Normalize(*limits), colours), there, colouring)
+    extremes = float(values.min()), float(values.max())
+    shading = ScalarMappable(Normalize(*limits), colours)
+    colour_bar(figure, shading, there, style.title(shown.label, shown.kind), extremes)
     for axes in there:
         axes.set_anchor("C")
 
@@ -301,9 +299,8 @@ def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: s
     axes.set(aspect="equal", xlim=ends[0], ylim=ends[1], xlabel=x, ylabel=y)
     axes.set_title(f"pressure on {name}")
     axes.ticklabel_format(**POWERS)
-    ends_of_values = float(values.min()), top
-    colouring = Scale(style.title("contact pressure", "stress"), ends_of_values, (0.0, top))
-    colour_bar(figure, shading, [axes], colouring)
+    label, extremes = style.title("contact pressure", "stress"), (float(values.min()), top)
+    colour_bar(figure, shading, [axes], label, extremes)
 
 
 def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
