@@ -19,7 +19,6 @@ from .output import Profile, Unit, plot_solids, plot_solution, write_revolved, w
 from .results import (
     Number,
     Values,
-    html_of,
     line_of,
     read,
     record_of,
@@ -169,10 +168,6 @@ class Solution(Measured):
     def __str__(self) -> str:
         """One line: unknowns, active points, steps, pairs' forces; estimate, bound if known."""
         return line_of(self)
-
-    def _repr_html_(self) -> str:
-        """Table for notebooks."""
-        return html_of(self)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""

@@ -306,7 +306,7 @@ def adapt(
         Of another load on the same geometry, with the same pairs, order and element. The first
         level has a mesh that fits it, finer or coarser than its own, and starts from its contact.
     progress : bool
-        Tell each level when it is done: a line in a terminal, a growing table in a notebook.
+        Write a line to standard error when a level is done.
 
     Yields
     ------
@@ -343,7 +343,7 @@ def adapt(
         )
     warn_of_implausible(problem, mesh, refinement.order, found)
     solutions = with_warnings(levels(problem, mesh, refinement, found, start))
-    return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
+    return Run(with_progress(solutions) if progress else solutions)
 
 
 class Run(Iterator[Solution]):

@@ -23,4 +23,3 @@ from .values import boundary_mask as boundary_mask
 from .values import numbers as numbers
 from .values import region_mask as region_mask
 from .values import scalar_data as scalar_data
-from .values import table as table

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import ngsolve as ng
 import numpy as np
 
-from .values import described, region_name, scalar_data, unit_vector
+from .values import region_name, scalar_data, unit_vector
 
 Gap: TypeAlias = float | ng.CoefficientFunction | Callable[..., np.ndarray]
 
@@ -99,14 +99,6 @@ class Contact:
         """Both sides, as a user knows them."""
         other = "a rigid obstacle" if self.primary is None else f'"{self.primary}"'
         return f'"{self.secondary}" with {other}'
-
-    def description(self) -> str:
-        """Direction, gap and kind, in a few words."""
-        along = "the normal" if self.direction is None else described(self.direction)
-        parts = [f"along {along}"]
-        if self.gap is not None:
-            parts.append(f"gap {described(self.gap)}")
-        return ", ".join([*parts, *(["bilateral"] if self.bilateral else [])])
 
     def swapped(self) -> Contact:
         """The pair with its roles exchanged; a gap stays where it is measured or given."""

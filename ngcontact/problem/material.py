@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import ngsolve as ng
 import numpy as np
 
-from .values import SYMMETRIC, described, refuse_where, scalar_data
+from .values import SYMMETRIC, refuse_where, scalar_data
 
 VOIGT = {  # components of stress and strain in each model, the shear strain an engineering one
     "plane strain": ("xx", "yy", "xy"),
@@ -118,10 +118,6 @@ class Elastic:
         made = _isotropic if varies(self) else _isotropic_numbers
         return made(normal, cross, shear, model)
 
-    def description(self) -> str:
-        """Its constants, in a few words."""
-        return f"E = {described(self.E)}, nu = {described(self.nu)}"
-
     def check_at(self, points: np.ndarray, name: str) -> None:
         """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""
         if not isinstance(self.E, float):
@@ -177,12 +173,6 @@ class Hooke:
         if isinstance(self.C, np.ndarray):
             return ng.CF(tuple(self.C.ravel().tolist()), dims=self.C.shape)
         return _kept(ng.CF(self.C))
-
-    def description(self) -> str:
-        """Its matrix, in a few words."""
-        if isinstance(self.C, np.ndarray):
-            return "C = " + ", ".join(described(tuple(row)) for row in self.C.tolist())
-        return "C = function"
 
     def check_model(self, model: str, name: str) -> None:
         """Refuse a matrix of another model; `name` leads the message."""

@@ -140,19 +140,11 @@ class Problem:
     def _repr_html_(self) -> str:
         """Table of the data for notebooks, a line each."""
         rows = [("model", "", self.model)]
-        for name, law in self.materials.items():
-            rows.append(("material", name, law.description()))
-        for name, values in self.displacement.items():
-            rows.append(("displacement", name, described(values)))
-        if self.sliding is not None:
-            rows.append(("sliding", str(self.sliding), "no normal displacement, no shear"))
-        for name, load in self.traction.items():
-            kind = "pressure " if ng.CF(load).dim == 1 else ""
-            rows.append(("traction", name, kind + described(load)))
-        rows += [("force", name, described(load)) for name, load in self.force.items()]
-        rows += [("strain", name, described(strain)) for name, strain in self.strain.items()]
-        for number, pair in enumerate(self.contact):
-            rows.append((f"contact {number}", pair.named(), pair.description()))
+        for what in ("materials", "displacement", "traction", "force", "strain"):
+            rows += [(what, name, described(data)) for name, data in getattr(self, what).items()]
+        if self.guide is not None:
+            rows.append(("sliding", self.guide, "no normal displacement, no shear"))
+        rows += [(f"contact {k}", "", described(pair)) for k, pair in enumerate(self.contact)]
         return table(("", "where", "what"), rows)
 
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from html import escape
 from numbers import Real
 from typing import Any, NoReturn, TypeAlias
@@ -219,7 +220,12 @@ def described(value: Any) -> str:
     """A value in a few characters: numbers, "free" for None, "function" for all that varies."""
     if value is None:
         return "free"
-    if isinstance(value, tuple):
+    if isinstance(value, str | bool):
+        return str(value)
+    if is_dataclass(value):  # what is not as usual
+        given = ((f.name, getattr(value, f.name), f.default) for f in fields(value))
+        return ", ".join(f"{name} = {described(x)}" for name, x, usual in given if x is not usual)
+    if isinstance(value, tuple | np.ndarray):
         return f"({', '.join(map(described, value))})"
     if not isinstance(value, ng.CoefficientFunction):
         return f"{value:.6g}" if isinstance(value, Real) else "function"

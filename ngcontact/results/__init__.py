@@ -5,7 +5,6 @@ from .archive import restored as restored
 from .archive import save as save
 from .archive import state_of as state_of
 from .record import Number as Number
-from .record import html_of as html_of
 from .record import line_of as line_of
 from .record import record_of as record_of
 from .record import with_progress as with_progress
