@@ -1,6 +1,5 @@
 from .continuation import continued as continued
 from .marking import doerfler as doerfler
-from .marking import mark_alike as mark_alike
 from .planning import Aim as Aim
 from .planning import Forecast as Forecast
 from .planning import Plan as Plan

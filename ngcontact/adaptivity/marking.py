@@ -35,22 +35,3 @@ def doerfler(indicators: Array, theta: float) -> Mask:
         count = np.searchsorted(carried, theta * carried[-1] * (1 - SUM_ROUND_OFF)) + 1
         marked[order[:count]] = True
     return marked
-
-
-def mark_alike(marked: Mask, alike: Mask, sizes: Array) -> Mask:
-    """The marked elements, and all `alike` ones that are as large as the smallest marked of these.
-
-    Of masks `marked` (ne,) and `alike` (ne,), with diameters `sizes` (ne,), a mask (ne,). Where one
-    of many elements stands out by chance, as by how a line cuts it, Doerfler's marking takes one
-    after the other, a level each.
-
-    Examples
-    --------
-    >>> marked, alike = np.array([True, False, False]), np.array([True, True, True])
-    >>> mark_alike(marked, alike, np.array([2, 1, 3]))
-    array([ True, False,  True])
-    """
-    both = marked & alike
-    if not both.any():
-        return marked
-    return np.asarray(marked | (alike & (sizes >= sizes[both].min() * (1 - SUM_ROUND_OFF))))

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, across, joined, root_of_squares
 from ..estimator import Estimated
-from ..fem import ORDERS, check_element, jumping_moduli, unknowns
+from ..fem import ORDERS, check_element, unknowns
 from ..mesh import copied, curve, unresolved
 from ..problem import MeshArrays, bisect
 from ..solved import expected_pairs
-from .marking import doerfler, mark_alike
+from .marking import doerfler
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact
 
@@ -133,9 +133,8 @@ def next_plan(
 
     By its indicators, but for those that no mesh makes less. Marked are Doerfler's elements and
     those in which contact ends, known to the square of their size as the energy is to that of the
-    relative error. Elements in which moduli jump are refined together, and nothing is forecast. In
-    elements `narrow` (ne,) data are narrower than these. Of solids Doerfler's elements are marked,
-    once, and nothing is forecast.
+    relative error. In elements `narrow` (ne,) data are narrower than these. Of solids Doerfler's
+    elements are marked, once, and nothing is forecast.
     """
     if solution.problem.dim == 3:
         return _next_of_solids(solution, refinement, last)
@@ -146,11 +145,9 @@ def next_plan(
         indicators = solution.indicators
     order = refinement.next_order(last.order, solution.relative_error_estimate)
     size, pairs = refinement.ending * solution.relative_error_estimate, expected_pairs(solution)
-    jumping, limit = jumping_moduli(problem, mesh), at_limit(mesh, mesh.GetCurveOrder())
-    marked = doerfler(indicators, theta)
+    limit, marked = at_limit(mesh, mesh.GetCurveOrder()), doerfler(indicators, theta)
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)
-    marked = mark_alike(marked, jumping, MeshArrays(mesh).diameters)
     marked |= at_ends(solution.discrete.space.trace, pairs, size) | narrow
     stuck, marked = bool((marked & limit).any()), marked & ~limit
     if not marked.any():
@@ -172,7 +169,6 @@ def next_plan(
         order=order,
         singular=joined([last.corners, ends_of_contact(pairs)]),
     )
-    growth = 1.0 if jumping.any() else growth
     aim = Aim(now * growth, refinement.max_dofs, share, theta, size)
     refining, share = planned(Refining(problem, mesh), marked, forecast, aim, refinement.element)
     mesh, _ = curve(refining.finished(), order, refinement.element)

@@ -18,7 +18,6 @@ from .model import summing as summing
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import Moduli as Moduli
 from .moduli import contact_modulus as contact_modulus
-from .moduli import jumping_moduli as jumping_moduli
 from .moduli import moduli_of as moduli_of
 from .moduli import nearly_incompressible as nearly_incompressible
 from .moduli import rough_moduli as rough_moduli

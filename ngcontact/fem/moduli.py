@@ -221,17 +221,6 @@ def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
     return rough
 
 
-def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
-    """Elements (ne,) in which the law jumps, by more than half of itself, and their neighbours.
-
-    A line may cut off a corner that no point of a small element shows.
-    """
-    view, jumps = SampledElements(mesh, 2), np.zeros(mesh.ne, dtype=bool)
-    for _, elements in _rough(problem, mesh):
-        jumps[[*elements.jumps()]] = True
-    return view.with_neighbours(jumps, np.arange(mesh.ne))
-
-
 def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of every law, or strain, that jumps inside elements, where it jumps most."""
     jumps: dict[str, list[tuple[Array, Array]]] = {}

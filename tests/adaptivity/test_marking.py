@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ngcontact.adaptivity import Refinement
-from ngcontact.adaptivity.marking import doerfler, mark_alike
+from ngcontact.adaptivity.marking import doerfler
 from ngcontact.adaptivity.planning import best_order
 
 SHARES = st.floats(0.01, 1.0)
@@ -63,15 +63,6 @@ def test_nothing_is_marked_where_all_indicators_vanish(size, theta):
     assert marked.shape == (size,)
     assert marked.dtype == bool
     assert not marked.any()
-
-
-def test_alike_elements_are_marked_together_down_to_the_smallest_marked():
-    alike = np.array([True, True, True, False, True])
-    sizes = np.array([1.0, 2.0, 0.5, 4.0, 1.0])
-    marked = np.array([True, False, False, False, False])
-    assert mark_alike(marked, alike, sizes).tolist() == [True, True, False, False, True]
-    others = np.array([False, False, False, True, False])
-    assert (mark_alike(others, alike, sizes) == others).all()
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
