@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..estimator import Guaranteed
 from .files import check_path
-from .pictures import COLOURS, MARKS, new_figure, show
+from .pictures import colour_and_mark, new_figure, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,40 +23,17 @@ TRIANGLE_DEPTH = 0.6  # of the curve, where a triangle lies
 Run = Sequence[Guaranteed] | tuple[Any, Any]
 
 
-def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = False) -> None:
-    """A triangle of the slope -`rate` at the end of a curve `x`, `y` (k,) in logarithmic axes.
-
-    It lies below the curve, or `above`.
-    """
-    corners = _triangle(x, y, rate, above)
-    axes.plot(*corners.T, color="0.4", lw=0.8)
-    (left, start), (_, end), corner, _ = corners
-    upright, level = (corner[0], np.sqrt(end * start)), (np.sqrt(left * float(x[-1])), corner[1])
-    one, other = ((3, 0), (0, 2)) if above else ((-3, 0), (0, -2))
+def slope_triangle(axes: Axes, x: Array, y: Array, rate: float) -> None:
+    """A triangle of the slope -`rate` below the end of a curve `x`, `y` (k,), both logarithmic."""
+    right, end = float(x[-1]), TRIANGLE_DEPTH * float(y[-1])
+    left, start = right / TRIANGLE_SPAN, end * TRIANGLE_SPAN**rate
+    axes.plot([left, right, left, left], [start, end, end, start], color="0.4", lw=0.8)
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "0.3"}
-    side, va = ("left", "bottom") if above else ("right", "top")
-    axes.annotate(f"{rate:g}", upright, xytext=one, ha=side, va="center", **beside)
-    axes.annotate("1", level, xytext=other, ha="center", va=va, **beside)
-
-
-def _triangle(x: Array, y: Array, rate: float, above: bool) -> Array:
-    """Corners (4, 2) of a triangle, closed; the third one is at the right angle."""
-    right = float(x[-1])
-    left = right / TRIANGLE_SPAN
-    end = float(y[-1]) * (1 / TRIANGLE_DEPTH if above else TRIANGLE_DEPTH)
-    start = end * TRIANGLE_SPAN**rate
-    corner = (right, start) if above else (left, end)
-    return np.array([(left, start), (right, end), corner, (left, start)])
-
-
-def _crossed(corners: Array, curves: Sequence[tuple[Array, Array]]) -> int:
-    """Number of points of `curves`, and of the lines between, in the box of a triangle."""
-    low, high = np.log(corners.min(axis=0)), np.log(corners.max(axis=0))
-    at, count = np.linspace(low[0], high[0], 50), 0
-    for x, y in curves:
-        there = np.interp(at, np.log(x), np.log(y), left=np.nan, right=np.nan)
-        count += int(np.count_nonzero((there > low[1]) & (there < high[1])))
-    return count
+    for text, place, offset, ha, va in (
+        (f"{rate:g}", (left, np.sqrt(end * start)), (-3, 0), "right", "center"),
+        ("1", (np.sqrt(left * right), end), (0, -2), "center", "top"),
+    ):
+        axes.annotate(text, place, xytext=offset, ha=ha, va=va, **beside)
 
 
 def plot_convergence(
@@ -105,26 +82,21 @@ def plot_convergence(
     axes = figure.subplots()
     for k, (label, run) in enumerate(named.items()):
         (x, y), rate, name = curves[label], (rates or {}).get(label), label
-        style: dict[str, Any] = {
-            "color": COLOURS[k % len(COLOURS)],
-            "marker": MARKS[k % len(MARKS)],
-        }
+        colour, mark = colour_and_mark(k)
+        style: dict[str, Any] = {"color": colour, "marker": mark, "ms": 4}
         known = []
         if not isinstance(run, tuple):
             order = run[-1].order
             name, rate = label or f"estimate, order {order}", order / 2 if rate is None else rate
             known = [level for level in run if level.bounded]
-        axes.plot(x, y, label=name, ms=4, **style)
+        axes.plot(x, y, label=name, **style)
         if known:
             size = [float(level.displacement.space.ndof) for level in known]
             bound = [level.relative_error_bound for level in known]
             name = f"{label}, bound".lstrip(", ")
-            axes.plot(size, bound, ls="--", mfc="w", label=name, ms=4, **style)
+            axes.plot(size, bound, ls="--", mfc="w", label=name, **style)
         if rate is not None:
-            others = [curve for other, curve in curves.items() if other != label]
-            places = [_triangle(x, y, rate, above) for above in (False, True)]
-            under, over = (_crossed(place, others) for place in places)
-            slope_triangle(axes, x, y, rate, above=over < under)
+            slope_triangle(axes, x, y, rate)
     axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="relative error, energy norm")
     axes.grid(which="major", alpha=0.3)
     axes.legend()

@@ -27,22 +27,19 @@ def check_path(path: str | os.PathLike[str], suffix: str) -> Path:
     folder is missing, none or refuses new files, or if it is a folder or a protected file.
     """
     target = Path(path)
+    say = f"cannot write {str(target)!r}: "
     if target.suffix.lower() != suffix:
-        raise ValueError(f"cannot write {str(target)!r}: the name must end in {suffix!r}")
-    folder, say = target.parent, f"cannot write {str(target)!r}: "
-    if not folder.exists():
-        raise FileNotFoundError(f"{say}there is no folder {str(folder)!r}; create it first")
-    if not folder.is_dir():
-        raise NotADirectoryError(f"{say}{str(folder)!r} is not a folder")
+        raise ValueError(f"{say}the name must end in {suffix!r}")
+    try:
+        tempfile.TemporaryFile(dir=target.parent).close()
+    except OSError as error:
+        folder = str(target.parent)
+        reason = f"{say}no file can be made in {folder!r} ({error.strerror}); choose another folder"
+        raise OSError(error.errno, reason) from error
     if target.is_dir():
         raise IsADirectoryError(f"{say}it is a folder; give the name of a file")
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(f"{say}the file is write-protected; choose another name")
-    try:
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError as error:
-        reason = f"{say}the folder refuses new files ({error.strerror}); choose another folder"
-        raise OSError(error.errno, reason) from error
     return target
 
 

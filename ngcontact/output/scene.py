@@ -16,12 +16,7 @@ from ..contact import neighbours
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS, MeshArrays
 from ..solved import Solved, full_stress
-from .nodes import (
-    Nodes,
-    nodes_of,
-    principal_stresses,
-    subdivision,
-)
+from .nodes import Nodes, nodes_of, principal_stresses, subdivision
 
 MAX_TRIANGLES = 200_000  # of a picture: more cannot be seen
 # Of a zone's size: distance to a line of symmetry up to which both halves are one zone.
@@ -130,46 +125,43 @@ def coordinates(solution: Solved) -> tuple[str, ...]:
 
 
 def fields(solution: Solved) -> dict[str, Field]:
-    """Every field by name."""
+    """Every field by name; raises ``RuntimeError`` where the mesh was changed since."""
     x, y, *z = coordinates(solution)
     normal = "zz" if x == "x" else "hoop"
     names = [f"{x}{x}", f"{y}{y}", f"{x}{y}", normal, "yz", "xz"][: 2 * solution.mesh.dim]
+    read = {"stress": full_stress(solution), "length": ng.CF(tuple(solution.displacement))}
 
-    def stress(label: str, of: Callable[[Array], Array]) -> Field:
-        """Field of the components of `full_stress`."""
+    def field(label: str, of: Callable[[Array], Array], kind: str = "stress") -> Field:
+        """Field of the components of `full_stress` (k, c), or of the displacement (k, d)."""
 
         def values(nodes: Nodes) -> Array:
-            found = of(nodes.values(full_stress(solution)))
-            return 0.0 * found if solution.stress_free else found  # round-off has no colours
+            free = kind == "stress" and solution.stress_free  # round-off has no colours
+            return of(nodes.values(read[kind])) * (0.0 if free else 1.0)
 
-        return Field(label, "stress", values)
-
-    def displacement(label: str, of: Callable[[Array], Array]) -> Field:
-        """Field of the components (k, d)."""
-        move = ng.CF(tuple(solution.displacement))
-        return Field(f"displacement{label}", "length", lambda nodes: of(nodes.values(move)))
+        return Field(label, kind, values)
 
     def component(number: int) -> Callable[[Array], Array]:
         return lambda values: np.asarray(values[:, number])
 
-    return {
-        "von_mises": stress("von Mises stress", von_mises),
-        **{f"stress_{a}": stress(f"stress {a}", component(k)) for k, a in enumerate(names)},
-        "largest_principal": stress(
+    found = {
+        "von_mises": field("von Mises stress", von_mises),
+        **{f"stress_{a}": field(f"stress {a}", component(k)) for k, a in enumerate(names)},
+        "largest_principal": field(
             "largest principal stress", lambda s: principal_stresses(s)[:, 0]
         ),
-        "smallest_principal": stress(
+        "smallest_principal": field(
             "smallest principal stress", lambda s: principal_stresses(s)[:, 2]
         ),
-        "mean_pressure": stress(
+        "mean_pressure": field(
             "mean pressure, −tr σ/3", lambda s: -s[:, [0, 1, 3]].sum(axis=1) / 3
         ),
-        "displacement": displacement(", absolute value", lambda u: np.linalg.norm(u, axis=1)),
-        **{
-            f"displacement_{a}": displacement(f" along {a}", component(k))
-            for k, a in enumerate((x, y, *z))
-        },
+        "displacement": field(
+            "displacement, absolute value", lambda u: np.linalg.norm(u, axis=1), "length"
+        ),
     }
+    for k, a in enumerate((x, y, *z)):
+        found[f"displacement_{a}"] = field(f"displacement along {a}", component(k), "length")
+    return found
 
 
 class ContactPath(NamedTuple):
@@ -295,7 +287,6 @@ class Scene:
 def picture(solution: Solved, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
     shown = style.shown(solution)
-    _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     mesh = solution.mesh
     order = max(mesh.GetCurveOrder(), solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones

@@ -84,7 +84,6 @@ def plot_solids(
     if style.mirror is not None:
         raise ValueError(f'mirror = "{style.mirror}": solids are not mirrored; leave it out')
     target, _ = None if path is None else check_path(path, ".png"), style.shown(solution)
-    _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     forces = [float(pair.force.sum()) if pair.gap.size else -np.inf for pair in solution.pairs]
     pair, pairs = int(np.argmax(forces)) if forces else 0, solution.problem.contact
     zone = _zone(solution, pair) if len(solution.points) else None

@@ -6,7 +6,6 @@ import math
 import os
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,27 +31,11 @@ PLANE: tuple[str, ...] = ("xx", "yy", "xy", "zz")
 MERIDIAN: tuple[str, ...] = ("rr", "zz", "rz", "hoop")
 SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetric tensor
 VTK_WEDGE = 13
-LINKS = {False: "lines", True: "faces"}  # cells between contact points, of solids
 SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at most
 
 
-@dataclass(frozen=True, eq=False)
-class Sections:
-    """Meridian sections of a body of revolution, and the steps between them."""
-
-    angles: Array  # (t,), radians
-    first: Index  # (q,), number of the section at which a step begins
-    second: Index  # (q,), and ends
-
-    def turned(self, vectors: Array) -> Array:
-        """Vectors (m, 3) that `vectors` (k, 2) of components r, z are at each of the angles."""
-        r, z = vectors.T
-        x, y = np.outer(np.cos(self.angles), r), np.outer(np.sin(self.angles), r)
-        return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=2).reshape(-1, 3)
-
-
 def write_solution(
-    path: str | os.PathLike[str], solution: Estimated, sections: Sections | None = None
+    path: str | os.PathLike[str], solution: Estimated, angle: float | None = None
 ) -> Path:
     """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
 
@@ -69,7 +52,7 @@ def write_solution(
     the names by number of the pair in ``pair_names``, ``secondary_names``, ``primary_names``. Any
     consistent units. Returns the path.
     A file appears complete or not at all. Raises ``ValueError`` and ``OSError`` as `check_path`
-    does, before any work. Of the `sections` of a body of revolution see `write_revolved`.
+    does, before any work. Of the `angle` of a body of revolution see `write_revolved`.
     """
     target = check_path(path, ".vtu")
     beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
@@ -77,9 +60,15 @@ def write_solution(
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
     writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
-    made = _bodies(solution, sections), _contact(solution, sections)
+    bodies, contact = _bodies(solution), _contact(solution)
+    if angle is not None:
+        parts = subdivision(max(solution.mesh.GetCurveOrder(), solution.order))[0]
+        triangles = bodies.cells.reshape(bodies.n_cells, -1)[:, 1:][:, parts].reshape(-1, 3)
+        contact.point_data.pop("force", None)  # of a ring
+        bodies = _revolved(bodies, triangles, angle)
+        contact = _revolved(contact, contact.lines.reshape(-1, 3)[:, 1:], angle)
     with replacing(target, beside) as drafts:
-        for writer, data, draft in zip(writers, made, drafts, strict=True):
+        for writer, data, draft in zip(writers, (bodies, contact), drafts, strict=True):
             writer.SetFileName(str(draft))
             writer.SetInputData(data)
             display = vtkObject.GetGlobalWarningDisplay()  # VTK raises nothing, and prints
@@ -100,11 +89,9 @@ def write_revolved(path: str | os.PathLike[str], solution: Estimated, angle: flo
 
     The meridian section is turned by `angle` degrees about z.
 
-    Wedges between sections of linear triangles, order^2 of them for each element. Point data:
-    ``displacement`` (three components), ``stress`` (rr, zz, hoop, rz), ``von_mises``. Cell data:
-    ``body``, whose names are the field data ``body_names``. Contact is on quadrilaterals between
-    contact points: ``pressure``, ``gap``, ``active``, ``pair``, and the ``traction`` on the
-    secondary (three components). Any consistent units. Returns the path.
+    Wedges between sections of linear triangles, order^2 of them for each element, and contact on
+    quadrilaterals between contact points, with the data of `write_solution` but forces; vectors
+    have three components. Returns the path.
 
     Raises ``ValueError`` for a plane model and for an angle outside (0, 360], and ``ValueError`` or
     ``OSError`` as `check_path` does, before any work.
@@ -115,10 +102,7 @@ def write_revolved(path: str | os.PathLike[str], solution: Estimated, angle: flo
         )
     if not 0 < angle <= 360:
         raise ValueError(f"angle = {angle}: give degrees above 0, at most 360")
-    steps = max(3, math.ceil(angle / SECTION_ANGLE))
-    angles = np.deg2rad(float(angle)) / steps * np.arange(steps if angle == 360 else steps + 1)
-    first = np.arange(steps)
-    return write_solution(path, solution, Sections(angles, first, (first + 1) % len(angles)))
+    return write_solution(path, solution, float(angle))
 
 
 def write_series(
@@ -174,8 +158,8 @@ def _in_space(vectors: Array) -> Array:
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
-def _bodies(solution: Estimated, sections: Sections | None) -> pyvista.UnstructuredGrid:
-    """Bodies with their fields: curved elements, or wedges between `sections`."""
+def _bodies(solution: Estimated) -> pyvista.UnstructuredGrid:
+    """Bodies with their fields, curved elements."""
     import pyvista
 
     order, d = max(solution.mesh.GetCurveOrder(), solution.order), solution.mesh.dim
@@ -185,44 +169,32 @@ def _bodies(solution: Estimated, sections: Sections | None) -> pyvista.Unstructu
     components, names = [0, 1, 2, 3], MERIDIAN if about_an_axis else PLANE
     if d == 3:
         components, names = [0, 1, 3, 2, 4, 5], SOLID
-    cells, kind, body = nodes.cells, VTK_CELLS[d][min(order, 3) - 1], nodes.body
-    lifted, times = _in_space, 1
-    if sections is not None:
-        triangles = nodes.cells[:, subdivision(order)[0]].reshape(-1, 3)
-        ends = sections.second, sections.first
-        wedges = [len(values) * at[:, None, None] + triangles for at in ends]
-        cells, kind = np.concatenate(wedges, axis=2).reshape(-1, 6), VTK_WEDGE
-        body = np.tile(np.repeat(nodes.body, order**2), len(sections.first))
-        components, names = [0, 1, 3, 2], ("rr", "zz", "hoop", "rz")
-        lifted, times = sections.turned, len(sections.angles)
-    kinds = np.full(len(cells), kind, dtype=np.uint8)
-    grid = pyvista.UnstructuredGrid(sized(cells), kinds, lifted(values[:, :d]))
-    stress = values[:, 2 * d :]
-    grid.point_data["displacement"] = lifted(values[:, d : 2 * d])
-    grid.point_data["stress"] = np.tile(stress[:, components], (times, 1))
+    cells = {VTK_CELLS[d][min(order, 3) - 1]: nodes.cells}
+    grid, stress = pyvista.UnstructuredGrid(cells, _in_space(values[:, :d])), values[:, 2 * d :]
+    grid.point_data["displacement"] = _in_space(values[:, d : 2 * d])
+    grid.point_data["stress"] = stress[:, components]
     for k, name in enumerate(names):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, name)
-    if about_an_axis and sections is None:
+    if about_an_axis:
         grid.point_data["hoop_stress"] = stress[:, 3]
-    grid.point_data["von_mises"] = np.tile(von_mises(stress), times)
-    grid.cell_data["body"] = body
+    grid.point_data["von_mises"] = von_mises(stress)
+    grid.cell_data["body"] = nodes.body
     grid.field_data["body_names"] = list(nodes.names)
-    if sections is None:
-        _name_pairs(grid, solution)
-        if solution.estimated:
-            grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
+    _name_pairs(grid, solution)
+    if solution.estimated:
+        grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
     return grid
 
 
-def _contact(solution: Solved, sections: Sections | None) -> pyvista.PolyData:
-    """Contact points with lines, of solids triangles, between neighbours; surfaces on `sections`.
+def _contact(solution: Solved) -> pyvista.PolyData:
+    """Contact points with lines, of solids triangles, between neighbours.
 
     Some corners of the triangles of solids are no contact points.
     """
     import pyvista
 
     points, m, solid = solution.points, len(solution.points), solution.mesh.dim == 3
-    data, lifted, times = pyvista.PolyData(), _in_space, 1
+    data = pyvista.PolyData()
     fields: dict[str, NDArray[Any]] = {
         "pressure": solution.pressure,
         "gap": solution.gap,
@@ -252,20 +224,48 @@ def _contact(solution: Solved, sections: Sections | None) -> pyvista.PolyData:
         else:
             rows = np.flatnonzero(solution.pair == pair)
             cells.append(rows[neighbours(solution.pairs[pair].line)])
-    if sections is None and m:
-        single, joined = sized(np.arange(m)[:, None]), sized(np.concatenate(cells))
-        data = pyvista.PolyData(_in_space(points), verts=single, **{LINKS[solid]: joined})
-    elif sections is not None and cells and len(links := np.concatenate(cells)):
-        first, second = (m * at[:, None] for at in (sections.first, sections.second))
-        quads = [first + links[:, 0], first + links[:, 1], second + links[:, 1]]
-        faces = np.stack([*quads, second + links[:, 0]], axis=2).reshape(-1, 4)
-        lifted, times = sections.turned, len(sections.angles)
-        data = pyvista.PolyData(lifted(points), faces=sized(faces))
-        del fields["force"]
-    for name, known in fields.items() if data.n_points else ():
-        data.point_data[name] = lifted(known) if known.ndim == 2 else np.tile(known, times)
+    if m:
+        joined = {"faces" if solid else "lines": sized(np.concatenate(cells))}
+        data = pyvista.PolyData(_in_space(points), verts=sized(np.arange(m)[:, None]), **joined)
+    for name, known in fields.items() if m else ():
+        data.point_data[name] = _in_space(known) if known.ndim == 2 else known
     _name_pairs(data, solution)
     return data
+
+
+def _revolved(section: Any, cells: Index, angle: float) -> Any:
+    """What `cells` (k, n) of points of a meridian section pass over, triangles or lines."""
+    import pyvista
+
+    if not section.n_points:
+        return section
+    steps = max(3, math.ceil(angle / SECTION_ANGLE))
+    angles = np.deg2rad(angle) / steps * np.arange(steps if angle == 360 else steps + 1)
+    first = np.arange(steps)[:, None, None]
+    one, other = (section.n_points * at + cells for at in (first, (first + 1) % len(angles)))
+
+    def turned(vectors: Array) -> Array:
+        """Vectors (t m, 3) that `vectors` (m, 3) of components r, z are at each of the angles."""
+        r, z, _ = vectors.T
+        x, y = np.outer(np.cos(angles), r), np.outer(np.sin(angles), r)
+        return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=2).reshape(-1, 3)
+
+    if cells.shape[1] == 3:
+        wedges = np.concatenate([other, one], axis=2).reshape(-1, 6)
+        whole: Any = pyvista.UnstructuredGrid({VTK_WEDGE: wedges}, turned(section.points))
+    else:
+        quads = np.concatenate([one, other[..., ::-1]], axis=2).reshape(-1, 4)
+        whole = pyvista.PolyData(turned(section.points), faces=sized(quads))
+    for name, known in section.point_data.items():
+        vectors = known.shape[1:] == (3,)
+        whole.point_data[name] = turned(known) if vectors else np.concatenate([known] * len(angles))
+        source, target = (x.GetPointData().GetAbstractArray(name) for x in (section, whole))
+        target.CopyComponentNames(source)
+    for name, known in section.cell_data.items():
+        whole.cell_data[name] = np.tile(np.repeat(known, len(cells) // len(known)), steps)
+    for name in section.field_data:
+        whole.field_data[name] = list(section.field_data[name])
+    return whole
 
 
 def _name_pairs(data: pyvista.DataSet, solution: Solved) -> None:

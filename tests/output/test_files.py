@@ -39,8 +39,8 @@ def test_a_half_written_file_replaces_none(tmp_path, error):
     [
         ("a.vtk", ValueError, r"must end in '\.vtu'"),
         ("a", ValueError, r"must end in '\.vtu'"),
-        ("none/a.vtu", FileNotFoundError, "there is no folder .*none"),
-        ("file/a.vtu", NotADirectoryError, "is not a folder"),
+        ("none/a.vtu", FileNotFoundError, "no file can be made in .*none.*No such"),
+        ("file/a.vtu", NotADirectoryError, "Not a directory"),
         ("folder.vtu", IsADirectoryError, "it is a folder"),
     ],
 )
@@ -63,15 +63,14 @@ def test_the_last_frame_is_seen_three_times_as_long(tmp_path, monkeypatch):
     assert times == [250, 250, 750]
 
 
-@pytest.mark.parametrize("above", [False, True])
-def test_the_triangle_has_the_slope(above):
+def test_the_triangle_has_the_slope():
     axes = Figure().subplots()
     x = np.array([1e2, 1e3, 1e4])
-    slope_triangle(axes, x, x**-1.5, 1.5, above)
+    slope_triangle(axes, x, x**-1.5, 1.5)
     [line] = axes.lines
     (x0, y0), (x1, y1) = line.get_xydata()[:2]  # its long side
     assert np.log(y1 / y0) / np.log(x1 / x0) == pytest.approx(-1.5)
-    assert (y1 > x1**-1.5) == above
+    assert y1 < x1**-1.5
 
 
 def test_von_mises_of_large_stresses():
@@ -88,8 +87,7 @@ def test_runs_are_drawn_with_their_rates(tmp_path):
     figure = plot_convergence(runs, tmp_path / "a.png", rates={"one": 0.5})
     [axes] = figure.axes
     assert [line.get_label() for line in axes.lines[:1]] == ["one"]
-    triangle = next(line.get_xydata() for line in axes.lines if len(line.get_xydata()) == 4)
-    assert (triangle[:, 1] >= 1e-2).all()  # above, where the other run is not
+    assert [len(line.get_xydata()) for line in axes.lines] == [3, 4, 3]  # one triangle
     assert (tmp_path / "a.png").stat().st_size > 0
     levels = [
         SimpleNamespace(
@@ -129,7 +127,7 @@ def test_folder_that_refuses_files_is_refused(tmp_path, monkeypatch):
         raise OSError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
-    with pytest.raises(PermissionError, match=r"refuses new files \(Permission denied\)"):
+    with pytest.raises(PermissionError, match=r"no file can be made .*\(Permission denied\)"):
         check_path(tmp_path / "a.vtu", ".vtu")
 
 
