@@ -166,8 +166,8 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     if problem.guide is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, problem.guide)
         points = BoundaryPoints(segment[guided], s[guided], ds[guided])
-        normal = _guide_normals(solution, points)
-        squares.append(_off_guide(solution, points, normal))
+        normal, off_guide = _off_guide(solution, points, problem.guide)
+        squares.append(off_guide)
         for vector in (residual, factor):
             along = (vector[guided] * normal).sum(axis=1)
             vector[guided] -= along[:, None] * normal
@@ -242,23 +242,21 @@ def _displacement(
     return Squares("displacement", element, 2 * solution.rigidity[element] * worst)
 
 
-def _guide_normals(solution: ScaledSolution, points: BoundaryPoints) -> Array:
-    """Unit vectors (k, 2) by which Gamma_0 is held at points of it."""
-    boundary, guide = solution.boundary, str(solution.problem.guide)
+def _off_guide(
+    solution: ScaledSolution, points: BoundaryPoints, guide: str
+) -> tuple[Array, Squares]:
+    """Unit vectors (k, 2) by which Gamma_0 is held at points of it, squares of u_h along them."""
+    boundary = solution.boundary
     segments, (number, normal) = boundary.segments(guide), boundary.guide(guide)
     nodal = normal[number].reshape(len(segments), -1, 2)
-    return between_nodes(nodal[np.searchsorted(segments, points.segment)], points.s)[0]
-
-
-def _off_guide(solution: ScaledSolution, points: BoundaryPoints, normal: Array) -> Squares:
-    """Squares of u_h.n between the nodes of Gamma_0."""
-    element = solution.boundary.element[points.segment]
-    u = solution.boundary.evaluate(solution.displacement, points.segment, points.s)
+    normal, _ = between_nodes(nodal[np.searchsorted(segments, points.segment)], points.s)
+    element = boundary.element[points.segment]
+    u = boundary.evaluate(solution.displacement, points.segment, points.s)
     miss = (u * normal).sum(axis=1)
     miss[np.abs(miss) <= GUIDE_NOISE * np.abs(u).max(initial=0.0)] = 0.0
     stiffness = 2 * solution.rigidity[element] / solution.diameter[element]
     cost = closing_energy(solution, points, stiffness, miss / solution.strain)
-    return Squares("displacement", element, points.weight * cost)
+    return normal, Squares("displacement", element, points.weight * cost)
 
 
 @dataclass(frozen=True, eq=False)

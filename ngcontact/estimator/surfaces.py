@@ -11,10 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask, rows_of
+from ..arrays import Array, Index, rows_of
 from ..contact import (
     ContactState,
-    FacingPieces,
     facing_pieces,
     interpolated_rays,
     opposite,
@@ -34,15 +33,6 @@ def _points(trace: BoundaryTrace, facets: Index, degree: int) -> BoundaryPoints:
     every, places = trace.at_places(facets, s)
     weight = trace.surface_element(every, places) * np.tile(w, len(facets))
     return BoundaryPoints(every, places, weight)
-
-
-def _residual(
-    solution: ScaledSolution, points: BoundaryPoints, name: str, values: Array, factor: float = 1.0
-) -> BoundaryResidual:
-    """Residual tractions `values` (k, c), with their weight (h / p) / 2mu."""
-    element = solution.boundary.element[points.segment]
-    weight = factor * solution.edge_weight[element] * points.weight
-    return BoundaryResidual(name, element, weight, values, [])
 
 
 def surface_terms(solution: ScaledSolution, pairs: Sequence[ContactState]) -> list[BoundaryTerms]:
@@ -79,10 +69,11 @@ def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTe
         at = np.flatnonzero(trace.lies_on(points.segment, problem.guide))
         n = trace.normal(points.segment[at], points.s[at])
         t[at] -= (t[at] * n).sum(axis=1)[:, None] * n
+    weight = solution.edge_weight[element] * points.weight
     squares = 2 * solution.mu[element] / solution.diameter[element] * points.weight
     squares = squares * ((miss / solution.strain) ** 2).sum(axis=1)  # (3.6)
     return BoundaryTerms(
-        residuals=[_residual(solution, points, "boundary", t)],
+        residuals=[BoundaryResidual("boundary", element, weight, t, [])],
         squares=[Squares("displacement", element, squares)],
         covered=NO_PARTS,
     )
@@ -113,13 +104,6 @@ def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Ar
 OPPOSITE = np.array([({0, 1, 2} - set(edge)).pop() for edge in triangle.EDGES.tolist()])
 
 
-def _in_contact(pair: ContactState) -> Mask:
-    """Facets (k,) of a zone all of whose rows are active."""
-    active = pair.line.on_segments(pair.active, False)
-    has = pair.line.rows >= 0
-    return np.asarray((active | ~has).all(axis=1) & has.any(axis=1))
-
-
 def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:
     """Terms of one pair, and the facets (j,) that it covers.
 
@@ -140,7 +124,9 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     s, w = triangle.gauss(degree)
     each = rows_of(parts, np.arange(len(parts.local)).repeat(len(s)))
     local, facing = each.local, each.facing
-    own = _on_parts(trace, zone.segments[parts.local], parts, s, w)
+    facet, places = zone.segments[local], parts.places(s)
+    weight = trace.surface_element(facet, places) * (parts.share[:, None] * w).ravel()
+    own = BoundaryPoints(facet, places, weight)
     d = interpolated_rays(trace, zone.contact, zone.segments, local, own.s)
     n = trace.normal(own.segment, own.s)
     cosine = (n * d).sum(axis=1)
@@ -148,7 +134,8 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     pi = discrete_pressure(trace, pair, local, own.s) / solution.unit
     if zone.contact.direction is None:
         weight, cosine = own.weight, np.ones(len(cosine))
-    full = _in_contact(pair)[local]
+    active, has = zone.on_segments(pair.active, False), zone.rows >= 0
+    full = np.asarray((active | ~has).all(axis=1) & has.any(axis=1))[local]
     element = trace.element[own.segment]
     u = trace.evaluate(solution.displacement, own.segment, own.s)
     t = solution.traction(own.segment, own.s) / np.abs(cosine)[:, None]
@@ -191,16 +178,8 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
         squares.append(Squares("complementarity", e, product * share))
     rest = np.concatenate([zone.segments[alone], zone.facing[~met]])
     points = _points(trace, rest, degree)
-    free = solution.traction(points.segment, points.s)
-    residuals.append(_residual(solution, points, "boundary", free))
+    free, element = solution.traction(points.segment, points.s), trace.element[points.segment]
+    weight = solution.edge_weight[element] * points.weight
+    residuals.append(BoundaryResidual("boundary", element, weight, free, []))
     both_sides = np.concatenate([zone.segments, zone.facing])
     return BoundaryTerms(residuals, squares, NO_PARTS), both_sides
-
-
-def _on_parts(
-    trace: FacetTrace, facets: Index, parts: FacingPieces, s: Array, w: Array
-) -> BoundaryPoints:
-    """Points `s` (g, 3) with weights `w` (g,) of all parts, on their `facets` (r,)."""
-    facet, places = np.repeat(facets, len(s)), parts.places(s)
-    weight = trace.surface_element(facet, places) * (parts.share[:, None] * w).ravel()
-    return BoundaryPoints(facet, places, weight)

@@ -98,10 +98,7 @@ class Problem:
             )
         dim = checks.dimension_of(self.geometry)
         object.__setattr__(self, "model", model_for(dim, self.model))
-        materials = by_region(self.materials, "materials", _law)
-        for name, law in materials.items():
-            if isinstance(law, Hooke):
-                law.check_model(self.model, f'materials "{name}"')
+        materials = by_region(self.materials, "materials", partial(_law, model=self.model))
         if not materials:
             raise ValueError("materials = {}: give every body an Elastic or a Hooke")
         for name, value in {
@@ -242,9 +239,11 @@ class Problem:
             checks.check_about_axis(view, *vectors, sides, e0)
 
 
-def _law(value: Any, what: str) -> Elastic | Hooke:
+def _law(value: Any, what: str, model: str) -> Elastic | Hooke:
     if not isinstance(value, Elastic | Hooke):
         raise TypeError(f"{what} = {value!r}: give an Elastic or a Hooke")
+    if isinstance(value, Hooke):
+        value.check_model(model, what)
     return value
 
 
