@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
@@ -34,73 +33,22 @@ SUPPORT_STIFFNESS = 1e6
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
 
 
-def correcting_pressure(
-    solution: ScaledSolution,
-    names: Sequence[str],
-    residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
-    terms: Sequence[BoundaryResidual],
-) -> PressureCorrection:
-    """Find delta on the nearly incompressible bodies `names`.
-
-    `residuals` are div sigma_h + F, (2,), in the elements and [sigma_h n], (2,), on their edges,
-    `terms` those on the boundary.
-    """
-    forms = _Forms(solution, names)
-    (inner, f), (outer, g) = forms.inside(*residuals), forms.on_boundary(terms)
-    A, b, B, K = (inner + outer).tocsr(), f + g, forms.divergence(), forms.stiffness()
-    # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a factorisation
-    # without pivots.
-    size = forms.space.ndof
-    inside = region_mask(forms.region)[MeshArrays(solution.mesh).bodies]
-    free = np.append(np.repeat(inside, forms.functions), K.diagonal() > 0)
-    saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
-    right = np.append(b, np.zeros(K.shape[0]))
-    found = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
-    pressure, motion = ng.GridFunction(forms.space), ng.GridFunction(forms.V)
-    pressure.vec.FV().NumPy()[:] = found[:size]
-    motion.vec.FV().NumPy()[:] = found[size:]
-    return PressureCorrection(forms, pressure, motion)
-
-
-@dataclass(frozen=True, eq=False)
 class PressureCorrection:
-    """The minimising delta, and the v_h of the supremum, for which that is mu |grad v_h|^2."""
+    """The minimising delta on nearly incompressible bodies `names`, and the v_h of the supremum.
 
-    forms: _Forms
-    pressure: ng.GridFunction
-    motion: ng.GridFunction
-
-    def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
-        """Add what delta contributes to a `residual` (k, c) at the boundary."""
-        on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
-        for share in shares:
-            if len(share.at):
-                boundary = self.forms.solution.boundary
-                delta = boundary.evaluate(on_boundary, share.segment, share.s)
-                residual[share.at] += share.factor * delta
-
-    def divergence_and_jump(self) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
-        """Grad delta and [delta n]: what delta adds inside the bodies, two of two components."""
-        delta = self.pressure
-        return ng.Grad(delta), (delta - delta.Other()) * ng.specialcf.normal(2)
-
-    def squares(self) -> Array:
-        """Squares (ne,) of the two terms that delta itself adds."""
-        forms, model = self.forms, self.forms.model
-        gradients = model.gradients(self.motion, self.motion)
-        density = self.pressure**2 / forms.kappa + forms.mu * gradients
-        values = ng.Integrate(model.weighted(density), forms.region, element_wise=True)
-        return np.asarray(values)
-
-
-class _Forms:
-    """The quadratic forms of the sum that delta minimises: on V, and on `space`, both global.
-
-    `element` and `edge` are the weights of squared residuals, constant on each element, as are
-    shear and bulk moduli; pressures and moduli are in the units of the `solution`.
+    For that the supremum is mu |grad v_h|^2. `residuals` are div sigma_h + F, (2,), in the elements
+    and [sigma_h n], (2,), on their edges, `terms` those on the boundary. `element` and `edge` are
+    the weights of squared residuals, constant on each element, as are shear and bulk moduli;
+    pressures and moduli are in the units of the `solution`.
     """
 
-    def __init__(self, solution: ScaledSolution, names: Sequence[str]) -> None:
+    def __init__(
+        self,
+        solution: ScaledSolution,
+        names: Sequence[str],
+        residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
+        terms: Sequence[BoundaryResidual],
+    ) -> None:
         mesh, order = solution.mesh, solution.order
         self.solution, self.model = solution, solution.model
         self.region = mesh.Materials("|".join(map(re.escape, names)))
@@ -117,8 +65,40 @@ class _Forms:
         self.edge = constant(solution.edge_weight)
         self.mu = constant(solution.mu)
         self.kappa = constant(moduli_of(solution.problem, mesh).bulk / solution.modulus)
+        (inner, f), (outer, g) = self._inside(*residuals), self._on_boundary(terms)
+        A, b, B, K = (inner + outer).tocsr(), f + g, self._divergence(), self._stiffness()
+        # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a
+        # factorisation without pivots.
+        size, inside = self.space.ndof, region_mask(self.region)[MeshArrays(mesh).bodies]
+        free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
+        saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
+        right = np.append(b, np.zeros(K.shape[0]))
+        found = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
+        self.pressure, self.motion = ng.GridFunction(self.space), ng.GridFunction(self.V)
+        self.pressure.vec.FV().NumPy()[:] = found[:size]
+        self.motion.vec.FV().NumPy()[:] = found[size:]
 
-    def inside(
+    def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
+        """Add what delta contributes to a `residual` (k, c) at the boundary."""
+        on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
+        for share in shares:
+            if len(share.at):
+                boundary = self.solution.boundary
+                delta = boundary.evaluate(on_boundary, share.segment, share.s)
+                residual[share.at] += share.factor * delta
+
+    def divergence_and_jump(self) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
+        """Grad delta and [delta n]: what delta adds inside the bodies, two of two components."""
+        delta = self.pressure
+        return ng.Grad(delta), (delta - delta.Other()) * ng.specialcf.normal(2)
+
+    def squares(self) -> Array:
+        """Squares (ne,) of the two terms that delta itself adds."""
+        gradients = self.model.gradients(self.motion, self.motion)
+        density = self.model.weighted(self.pressure**2 / self.kappa + self.mu * gradients)
+        return np.asarray(ng.Integrate(density, self.region, element_wise=True))
+
+    def _inside(
         self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction
     ) -> tuple[sp.csr_array, Array]:
         """Quadratic form and right side (n,) of the terms in elements and between them."""
@@ -136,7 +116,7 @@ class _Forms:
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
-    def on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
+    def _on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
         """Right side (n,) of the boundary terms."""
         boundary, size = self.solution.boundary, self.space.ndof
         numbers = np.arange(size).reshape(-1, self.functions)
@@ -160,7 +140,7 @@ class _Forms:
             b -= rows.T @ (weight * term.residual.ravel())
         return A, b
 
-    def stiffness(self) -> sp.csr_array:
+    def _stiffness(self) -> sp.csr_array:
         """Form of mu |grad v|^2, with v held where displacements are prescribed."""
         problem, mesh, model = self.solution.problem, self.solution.mesh, self.model
         u, v = self.V.TnT()
@@ -182,7 +162,7 @@ class _Forms:
         a.Assemble()
         return shared(a.mat)
 
-    def divergence(self) -> sp.csr_array:
+    def _divergence(self) -> sp.csr_array:
         """(q, div v) of pressures q and displacements v."""
         pressures = ng.L2(self.solution.mesh, order=self.solution.order)
         q, v = pressures.TrialFunction(), self.V.TestFunction()

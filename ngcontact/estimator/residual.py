@@ -55,7 +55,7 @@ from ..linalg import cholesky, lower_half, shared
 from ..quadrature import features_of, loads_of, pieces, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
-from .pressure_correction import correcting_pressure
+from .pressure_correction import PressureCorrection
 from .surfaces import surface_terms
 from .terms import (
     DATA_BONUS,
@@ -184,10 +184,7 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
 def _rough_tractions(
     solution: ScaledSolution, segment: Index, s: Array, residual: Array
 ) -> list[Squares]:
-    """Squares of what polynomials miss of tractions where these are rough.
-
-    There `residual` (k, 2) at `s` (k,) of segments (k,) is made that of the polynomials.
-    """
+    """Squares of what polynomials miss of rough tractions; `residual` (k, 2) takes polynomials."""
     boundary, problem, squares = solution.boundary, solution.problem, []
     for load in loads_of(problem, boundary.mesh):
         if load.kind != "traction" or not (found := load.where_rough(solution.order)):
@@ -276,10 +273,7 @@ class Estimate:
 
 
 def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> Estimate:
-    """Residual error estimate of a displacement in the energy norm.
-
-    The pressure of a body is corrected if its kappa / mu is `corrected_from` or more.
-    """
+    """Residual estimate; pressures of bodies are corrected from that kappa / mu on."""
     pairs, boundary = solved.pairs, solved.discrete.space.trace
     solution = scaled(solved)
     if solved.problem.dim == 3:
@@ -319,7 +313,7 @@ def _squares(
     degree, correction = solution.projected.space.globalorder, None
     names = nearly_incompressible(problem, mesh, corrected_from, solution.incompressibility)
     if names:
-        correction = correcting_pressure(solution, list(names), (divergence, jump), residuals)
+        correction = PressureCorrection(solution, list(names), (divergence, jump), residuals)
         parts["incompressibility"] = correction.squares()
         of_pressure = correction.divergence_and_jump()
         divergence += of_pressure[0]
