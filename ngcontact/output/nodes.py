@@ -84,11 +84,8 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     vertices = view.elements * len(names) + body[:, None]
     # A node is known by the vertices it leans on and its weights there, from any triangle.
     key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
-    key = np.sort(key.reshape(-1, mesh.dim + 1), axis=1)
-    rank = np.lexsort(key.T)
-    fresh = np.any(np.diff(key[rank], axis=0, prepend=-1), axis=1)
-    cells = np.empty(len(key), dtype=np.intp)
-    cells[rank] = np.cumsum(fresh) - 1
+    key = np.sort(key.reshape(-1, mesh.dim + 1), axis=1)[:, ::-1]
+    cells = np.unique(key, axis=0, return_inverse=True)[1]
     return Nodes(cells.reshape(-1, len(weights)), body, names, at)
 
 

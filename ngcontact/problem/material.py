@@ -23,8 +23,8 @@ SOLID = "solid"  # the model of bodies in space, the only one
 MODEL_NAMES = tuple(name for name in VOIGT if name != SOLID)
 ABOUT_AN_AXIS = ("axisymmetric",)
 
-# A pivot, relative to where it starts: round-off of zero.
-PIVOT_ROUND_OFF = 16 * np.finfo(float).eps
+# Least eigenvalue of a matrix of unit diagonal: round-off of zero.
+EIGENVALUE_ROUND_OFF = 16 * np.finfo(float).eps
 
 _RIGHT_E = "Young's modulus must be positive and finite"
 _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
@@ -199,10 +199,7 @@ def varies(law: Elastic | Hooke) -> bool:
 
 
 def _kept(modulus: ng.CoefficientFunction) -> ng.CoefficientFunction:
-    """The same function, of which NGSolve drops nothing in bilinear forms.
-
-    It takes exp(0 x) and cos(0 x) for 0 there; no sum with a parameter.
-    """
+    """The same function, of which NGSolve drops no exp(0 x) or cos(0 x) in bilinear forms."""
     zero = ng.Parameter(0.0)
     if modulus.dim == 1:
         return modulus + zero
@@ -229,22 +226,17 @@ def _real_matrix(data: Any) -> np.ndarray:
 def _faults(matrices: np.ndarray) -> list[tuple[np.ndarray, str]]:
     """Return (bad, what would be right) per condition for Voigt matrices (n, q, q), bad (n,).
 
-    Definite by the pivots of L D L^T, each against the diagonal entry it starts from: so the
-    verdict is the same in all units.
+    Definite by the least eigenvalue of the matrix of unit diagonal: the verdict is the same in all
+    units.
     """
     finite = np.isfinite(matrices).all(axis=(1, 2))
-    size = np.abs(matrices).max(axis=(1, 2))
-    left = np.array(matrices, dtype=float)
-    share, definite = np.ones(len(left)), np.ones(len(left), dtype=bool)
-    with np.errstate(all="ignore"):  # a pivot that is zero or not a number is the finding itself
+    size, start = np.abs(matrices).max(axis=(1, 2)), np.diagonal(matrices, axis1=1, axis2=2)
+    definite = finite & (start > 0).all(axis=1)
+    root = np.sqrt(start[definite])
+    scaled = matrices[definite] / root[:, :, None] / root[:, None, :]
+    definite[definite] = np.linalg.eigvalsh(scaled)[:, 0] > EIGENVALUE_ROUND_OFF  # (2.7)
+    with np.errstate(all="ignore"):  # what is not a number is the finding itself
         skew = np.abs(matrices - matrices.transpose(0, 2, 1)).max(axis=(1, 2)) / size
-        for k in range(matrices.shape[1]):
-            start = matrices[:, k, k]
-            # A small pivot enlarges the round-off in those after it: bound their product.
-            share = share * (left[:, k, k] / start)
-            definite &= (start > 0) & (share > PIVOT_ROUND_OFF)  # (2.7)
-            row = left[:, k, :].copy()
-            left -= row[:, :, None] * (row / row[:, k, None])[:, None, :]
     return [
         (~finite, "the entries of a Voigt matrix must be finite"),
         (skew > SYMMETRIC, "a Voigt matrix must be symmetric"),

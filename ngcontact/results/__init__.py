@@ -8,7 +8,5 @@ from .record import Number as Number
 from .record import line_of as line_of
 from .record import record_of as record_of
 from .record import with_progress as with_progress
-from .values import Location as Location
 from .values import Values as Values
-from .values import locate as locate
 from .values import values_at as values_at

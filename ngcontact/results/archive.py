@@ -9,7 +9,6 @@ from __future__ import annotations
 import gzip
 import os
 import pickle
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,6 @@ from ..discrete import reassembled
 from ..fem import assemble, boundary_trace, model_of
 from ..mesh import keep_parents, vertex_parents
 from ..output import check_path, replacing
-from ..problem import Problem
 from ..solved import Solved
 
 SUFFIX = ".ngcontact"
@@ -73,7 +71,14 @@ def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
     try:
         data = pickle.dumps(solution)
     except Exception as error:
-        for what, value in _parts(solution.problem):
+        problem = solution.problem
+        parts = [("geometry", problem.geometry)]
+        for argument in ("materials", "displacement", "traction", "force", "strain"):
+            data = getattr(problem, argument).items()
+            parts += [(f'{argument} "{name}"', value) for name, value in data]
+        for number, pair in enumerate(problem.contact):
+            parts.append((f'contact[{number}].gap of "{pair.secondary}"', pair.gap))
+        for what, value in parts:
             try:
                 pickle.dumps(value)
             except Exception as cause:
@@ -87,16 +92,6 @@ def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
         file.write(pickle.dumps(header))
         file.write(data)
     return target
-
-
-def _parts(problem: Problem) -> Iterator[tuple[str, Any]]:
-    """The data one by one, with their names."""
-    yield "geometry", problem.geometry
-    for argument in ("materials", "displacement", "traction", "force", "strain"):
-        for name, value in getattr(problem, argument).items():
-            yield f'{argument} "{name}"', value
-    for number, pair in enumerate(problem.contact):
-        yield f'contact[{number}].gap of "{pair.secondary}"', pair.gap
 
 
 def read(path: str | os.PathLike[str], version: str) -> Any:

@@ -40,11 +40,7 @@ class Location:
 
 
 def locate(trace: BoundaryTrace, points: Array) -> Location:
-    """Elements of the mesh of `trace` that contain the `points` (k, d), lengths.
-
-    A point between the mesh and the CAD curve or face that bounds the body lies in the element
-    beside it.
-    """
+    """Elements that contain `points` (k, d), or lie beside those between the mesh and the CAD."""
     finder = _Finder(trace)
     chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // POINTS_AT_ONCE)))
     return joined([finder.find(points, at) for at in chunks])

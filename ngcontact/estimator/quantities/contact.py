@@ -11,7 +11,7 @@ from ...fem import Bodies, BoundaryTrace, connected_bodies, prescribed_component
 from ...lagrange import gauss
 from ...solved import Solved
 from ..residual import Estimated
-from .table import Quantity, Singular, error_of_largest, unknown
+from .table import Quantity, Singular, error_of_largest
 
 LOAD_ROUND_OFF = 1e-9  # part of the largest load that is none
 # Error of pressures over the largest difference on a segment to p*, and to the discrete stress:
@@ -30,22 +30,18 @@ CORNER_RANGE = 0.05  # of a line's extent, how far from it corners count
 def peak_of(
     solution: Estimated, pair: ContactState, star: Array | None, corners: Singular
 ) -> Quantity:
-    """The largest pressure, away from corners at which it is infinite.
-
-    `star` (n,) are values of p* at the nodes of the pair's segments, one segment after the other,
-    if there are any.
-    """
+    """The largest pressure, away from infinite ones; `star` (n,) is p* at the nodes, if known."""
     name, line, pressure = "peak pressure", pair.line, pair.pressure
     boundary, rows = solution.discrete.space.trace, line.rows
     singular = corners.distinct(_on_line(corners, line.position))
     corners = corners.distinct(corners.pressed)
     away = ~corners.near(line.position)
     if not (pair.active & away).any():
-        return unknown(name, np.nan if pair.active.any() else 0.0, singular=singular)
+        return Quantity(name, np.nan if pair.active.any() else 0.0, singular=singular)
     at = int(np.where(away, pressure, -np.inf).argmax())
     peak, place = float(pressure[at]), line.position[at]
     if solution.relative_error_estimate > 1:
-        return unknown(name, peak, place, singular)
+        return Quantity(name, peak, place=place, singular=singular)
     factor = LONE_STRESS_FACTOR if star is None else STRESS_FACTOR
     off = factor * _off_stress(pair, boundary, solution.stress)
     if star is not None:
@@ -97,10 +93,7 @@ def _off_stress(
 
 
 def ends_of(pair: ContactState) -> list[Quantity]:
-    """Ends of contact, by the coordinate along which the points in contact extend.
-
-    The bar is a length along the line of contact: of either coordinate, too.
-    """
+    """Ends of contact, by the coordinate along which it extends; bars are lengths of the line."""
     line, ends = pair.line, pair.transitions
     axis = int(np.ptp(line.position[pair.active], axis=0).argmax()) if pair.active.any() else 0
     name = f"end of contact, {'xy'[axis]}"

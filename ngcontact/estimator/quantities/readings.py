@@ -41,7 +41,7 @@ from ..residual import Estimated
 from .contact import approach_of, area_in_contact, direction_of, ends_of, held_point_force, peak_of
 from .stresses import largest_von_mises, singular_corners
 from .surfaces import pressure_at_vertices, pressure_field
-from .table import Quantities, Quantity, Singular, unknown
+from .table import Quantities, Quantity, Singular
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
 # By order: 96 % of 118 are at most that, most of Hertz.
@@ -193,7 +193,7 @@ def _means(state: ContactState, boundary: BoundaryTrace, error: float) -> list[Q
     area, bar = area_in_contact(state, boundary)
     name, other = "contact area", "mean pressure"
     if not area > 0:
-        return [unknown(name, 0.0), unknown(other, 0.0)]
+        return [Quantity(name, 0.0), Quantity(other, 0.0)]
     mean = float(state.force.sum()) / area
     return [
         Quantity(name, area, bar, "estimated"),
@@ -314,10 +314,7 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
 
 
 def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
-    """Figures (c, 8) of a level of solids and the one before it, which the next level needs.
-
-    None of plane bodies, whose errors need no other levels.
-    """
+    """Figures (c, 8) of this level and the one before, of solids, for the errors of the next."""
     if solution.problem.dim == 2:
         return ()
     now = np.array([figures(solution, state)[0] for state in solution.pairs])
@@ -325,13 +322,10 @@ def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
 
 
 def quantities_of_solids(solution: Estimated, state: ContactState | None, pair: int) -> Quantities:
-    """Values of a pair, on levels of `adapt` with the larger of the last two level differences.
-
-    Without any pair the energy.
-    """
+    """Values of a pair, on levels of `adapt` with errors; without any pair the energy."""
     if state is None:
         return Quantities(
-            (unknown("energy", solution.energy),), "without an error, as without pairs"
+            (Quantity("energy", solution.energy),), "without an error, as without pairs"
         )
     values, place = figures(solution, state)
     levels = np.array([*(before[pair] for before in solution.earlier), values])

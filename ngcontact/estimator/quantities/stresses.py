@@ -22,7 +22,7 @@ from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace, boundary_corners, prescribed_components, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
 from ..residual import Estimated
-from .table import Quantity, Singular, error_of_largest, unknown
+from .table import Quantity, Singular, error_of_largest
 
 POINT_DISTANCE = 1e-9  # distance, relative to an element, at which points of two elements are one
 FREE, GUIDED, HELD, PRESSED = range(4)  # what is on a side of a corner
@@ -149,11 +149,7 @@ def _clamped_angles(problem: Problem, trace: BoundaryTrace) -> Array:
 def largest_von_mises(
     solution: Estimated, equilibrated: Callable[[Index, Array], Array] | None, corners: Singular
 ) -> Quantity:
-    """The largest one on a lattice over all elements, away from corners of infinite stress.
-
-    `equilibrated` has the values of the equilibrated stress, if there is one, at places (k, 2) of
-    elements (k,).
-    """
+    """The largest on a lattice, away from corners; `equilibrated` has that stress, if known."""
     name, mesh = "von Mises", solution.mesh
     singular = corners.distinct(np.ones(len(corners.places), dtype=bool))
     m = CONSTANT if solution.order == 1 else DIVISIONS
@@ -167,12 +163,12 @@ def largest_von_mises(
     stress = np.hstack([s.reshape(-1, 4)[:, [0, 3, 1]], normal.reshape(-1, 1)])
     mises, away = von_mises(stress), ~corners.near(xy)
     if not away.any():
-        return unknown(name, np.nan, singular=singular)
+        return Quantity(name, np.nan, singular=singular)
     at = int(np.where(away, mises, -np.inf).argmax())
     value, place = float(mises[at]), xy[at]
     alone = equilibrated is None and mesh.ne == 1  # nothing to compare with
     if solution.relative_error_estimate > 1 or alone:
-        return unknown(name, value, place, singular)
+        return Quantity(name, value, place=place, singular=singular)
     high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= STRESS_SHARE * value)
     some = np.repeat(high, n)
     off = _jumps(mesh, xy, mises, n)[some]

@@ -75,10 +75,7 @@ def _fitted(
     values: Array,
     weights: Array | None = None,
 ) -> ng.GridFunction:
-    """The discontinuous `field` made nearest to `values` (k, g) at `s` of `segments` (k,).
-
-    By `weights` (k, g), equal ones when left out.
-    """
+    """The discontinuous `field` made nearest to `values` (k, g) at `s`, by `weights` (k, g)."""
     if not len(segments):
         return field
     at = (field.space.GetDofNrs(ng.ElementId(ng.BND, int(i))) for i in segments)

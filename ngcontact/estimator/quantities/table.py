@@ -71,8 +71,8 @@ class Quantity:
 
     name: str
     value: float
-    error: float
-    kind: Literal["guaranteed", "estimated", "none"]
+    error: float = math.nan
+    kind: Literal["guaranteed", "estimated", "none"] = "none"
     place: Array | None = None
     proved: float | None = None
     singular: Singular | None = None
@@ -104,18 +104,8 @@ class Quantity:
         return f"{self.name:22s} {self.value:14.7g} {bar}  {self.kind:10s}{at}".rstrip()
 
 
-def unknown(
-    name: str, value: float, place: Array | None = None, singular: Singular | None = None
-) -> Quantity:
-    """A figure without a bar, at `place` (2,), infinite at the `singular` corners."""
-    return Quantity(name, value, math.nan, "none", place, singular=singular)
-
-
 def error_of_largest(value: float, samples: Array, errors: Array) -> float:
-    """Largest distance of a `value` from the largest of `samples` (k,) known to `errors` (k,).
-
-    At most: the largest lies between those of samples - errors and of samples + errors.
-    """
+    """How far a `value` is at most from the largest of `samples` (k,) known to `errors` (k,)."""
     above, below = (samples + errors).max() - value, value - (samples - errors).max()
     return float(max(above, below))
 
