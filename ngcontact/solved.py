@@ -218,10 +218,7 @@ def made_of(
     curved: int,
     **others: Any,
 ) -> Kind:
-    """The solution that a `minimiser` of the last of the discrete problems `tried` is.
-
-    With the counts of what these took, `curved` elements, and `others`, further fields of its kind.
-    """
+    """The solution of the last of the problems `tried`, with counts of what all of them took."""
     discrete = tried[-1]
     work = {
         "assemblies": sum(one.assembled for one in tried),

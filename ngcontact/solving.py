@@ -139,10 +139,7 @@ def solve(
 
 
 def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:
-    """A short adaptive run, to start a large mesh near its active set.
-
-    Empty where it would not pay: on small meshes, and without a CAD geometry to mesh coarsely.
-    """
+    """A short adaptive run, to start a large mesh near its active set; empty where none pays."""
     given = isinstance(problem.geometry, ng.Mesh)
     searched = any(not contact.bilateral for contact in problem.contact)
     size = unknowns(mesh, order, element)
@@ -347,10 +344,7 @@ def adapt(
 
 
 class Run(Iterator[Solution]):
-    """The levels of `adapt`, made one by one by a generator of `solutions`.
-
-    Whoever uses it as a `Solution` gets an error that explains.
-    """
+    """The levels of `adapt`; whoever uses it as a `Solution` gets an error that explains."""
 
     def __init__(self, solutions: Generator[Solution]) -> None:
         self._solutions = solutions
@@ -518,10 +512,7 @@ def levels(
 
 
 def warn_of_pairs(solution: Solution, issued: set[object], *, last: bool) -> None:
-    """Warn of what may be wrong and is not among the `issued` warnings, and add it there.
-
-    What a finer mesh mends is left out unless none follows: the mesh is the `last`.
-    """
+    """Warn of what is not `issued`, and add it there; what refinement mends on the `last` mesh."""
     found = pair_warnings(solution, last=last)
     for doubt, message in found.items():
         if doubt not in issued:
@@ -532,10 +523,7 @@ def warn_of_pairs(solution: Solution, issued: set[object], *, last: bool) -> Non
 
 
 def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
-    """The levels of a run, with a warning of whatever may be wrong, once.
-
-    What no mesh mends is said at the first level that shows it, what refinement mends at the last.
-    """
+    """The levels of a run; what no mesh mends is said at once, what refinement mends at the end."""
     issued: set[object] = set()
     estimates: list[float] = []
     solution = None

@@ -56,11 +56,7 @@ def continued(
 def rebuilt(
     problem: Problem, tree: RefinementTree, known: Forecast, aim: Aim, element: str
 ) -> Refining:
-    """The mesh of which a solution's `known` squares forecast the aim's error.
-
-    Made from the first mesh of its `tree`: what was refined for another load is not, if this one
-    does not need it.
-    """
+    """The mesh, refined from the first one, of which `known` squares forecast the aim's error."""
     refining, corners = Refining(problem, tree.mesh), MeshArrays(tree.mesh).corners
     squares = transferred(known, tree.element, corners)
     guess = TransferredForecast(
@@ -94,10 +90,7 @@ class TransferredForecast(Forecast):
         return replace(self, corners=corners, squares=squares, inside=inside)
 
     def marked(self, theta: float, share: float) -> Mask:
-        """Elements (ne,) to refine: so many that the others have the error `aim`.
-
-        `aim` takes the place of `theta`. `share`, of ends of contact, is not read: they move.
-        """
+        """Elements (ne,) to refine: so many that the others have the error `aim`; ends move."""
         rest = (self.aim / self.error) ** 2 if self.error > 0 else 1.0
         return doerfler(np.sqrt(self.squares), 1.0 - min(rest, 1.0))
 

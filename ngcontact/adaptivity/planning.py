@@ -46,23 +46,7 @@ def check_bool(name: str, value: object) -> None:
 
 @dataclass(frozen=True)
 class Refinement:
-    """Refinement of a sequence of levels, and its end.
-
-    Raises `ValueError` or `TypeError` with the offending value and what would be right.
-
-    Parameters
-    ----------
-    order, element, theta, tolerance, max_dofs, guaranteed
-        As in `adapt`.
-    ending : float
-        Size from which elements in which contact ends are refined: their segment's length over
-        that of its contact line, relative to the relative estimate.
-    growth : float
-        Of the unknowns up to which the next level is planned at first, and at most; with a
-        tolerance, at which planning stops anyway, at most its square. 1 marks once a level.
-    rising : bool
-        Whether levels have higher orders than the first where that is sooner.
-    """
+    """Refinement of a sequence of levels, and its end: arguments of `adapt`, refused as there."""
 
     order: int
     element: str
@@ -70,9 +54,13 @@ class Refinement:
     tolerance: float | None
     max_dofs: float
     guaranteed: bool = False
+    # Size from which elements in which contact ends are refined: their segment's length over that
+    # of its contact line, relative to the relative estimate.
     ending: float = 0.1
+    # Of the unknowns up to which the next level is planned at first, and at most; with a tolerance,
+    # at which planning stops anyway, at most its square. 1 marks once a level.
     growth: float = FIRST_GROWTH
-    rising: bool = False
+    rising: bool = False  # whether levels have higher orders than the first where that is sooner
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -95,10 +83,7 @@ class Refinement:
             raise ValueError("guaranteed=True with tolerance=None: give a tolerance, like 1e-3")
 
     def choosing(self, start: int | None) -> Refinement:
-        """The same with the order that is best: that of a `start`, or for the tolerance.
-
-        Without both the first levels have order 3, and later ones 4. `element` "physical" has 1.
-        """
+        """The same with the best order: of a `start`, or for the tolerance; 3, then 4 without."""
         if self.element == "physical":
             return self
         if start is not None:
@@ -137,7 +122,10 @@ def next_plan(
     elements are marked, once, and nothing is forecast.
     """
     if solution.problem.dim == 3:
-        return _next_of_solids(solution, refinement, last)
+        mesh = copied(solution.mesh)
+        bisect(mesh, doerfler(solution.indicators, refinement.theta))
+        mesh, _ = curve(mesh, last.order, refinement.element)
+        return replace(last, mesh=mesh, tree=RefinementTree(mesh, np.arange(mesh.ne)))
     problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
     small = below_resolution(mesh, last.corners.unresolvable)
     indicators = np.where(small, 0.0, solution.indicators)
@@ -176,19 +164,9 @@ def next_plan(
     return Plan(mesh, order, last.corners, share * error, growth, tree, stuck, unresolved(mesh))
 
 
-def _next_of_solids(solution: Estimated, refinement: Refinement, last: Plan) -> Plan:
-    mesh = copied(solution.mesh)
-    bisect(mesh, doerfler(solution.indicators, refinement.theta))
-    mesh, _ = curve(mesh, last.order, refinement.element)
-    return replace(last, mesh=mesh, tree=RefinementTree(mesh, np.arange(mesh.ne)))
-
-
 @dataclass(frozen=True)
 class Aim:
-    """Aim of a planned level: so many `unknowns`, or so small an `error`.
-
-    With `max_unknowns` at most, and so many `markings` as the forecast is good for.
-    """
+    """Aim of a planned level: so many `unknowns`, or `markings`, or so small an `error`."""
 
     unknowns: float
     max_unknowns: float
@@ -282,10 +260,7 @@ class Forecast:
         return replace(self, corners=corners, squares=squares)
 
     def marked(self, theta: float, share: float) -> Mask:
-        """Elements (ne,) to refine: Doerfler's, and those in which contact ends.
-
-        Of these the ones larger than the `share` of their contact line, as by `at_ends`.
-        """
+        """Elements (ne,) to refine: Doerfler's, and large ones in which contact ends."""
         marked = doerfler(np.sqrt(self.squares), theta)
         ends = np.isfinite(self.singular.extents)
         sizes = np.sqrt(2 * areas(self.corners))  # the legs, if two are equal at a right angle

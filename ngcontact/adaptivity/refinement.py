@@ -21,10 +21,7 @@ MATCHING_ROUNDS = 12  # refinements after which a facing segment that still lags
 
 @dataclass(frozen=True, eq=False)
 class RefinementTree:
-    """The first mesh of a sequence, and the elements that those of a later one are parts of.
-
-    Those of the first one are parts of themselves.
-    """
+    """The first mesh of a sequence, and its elements that those of a later one are parts of."""
 
     mesh: ng.Mesh
     element: Index  # (ne,), an element of it for each of the later ones
@@ -209,11 +206,7 @@ class Refining:
 
 
 def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.Mesh:
-    """Refined copy of a mesh, straight-sided, with matched contact lines kept matched.
-
-    Of the elements `marked` (ne,), or of all. The pairs of the problem determine which vertices
-    face each other; facing segments have the same number of new nodes.
-    """
+    """Refined copy of a mesh, of elements `marked` (ne,) or all; straight, with lines matched."""
     refining = Refining(problem, mesh)
     refining.bisect(np.ones(mesh.ne, dtype=bool) if marked is None else marked)
     return refining.finished()

@@ -35,10 +35,7 @@ def at_ends(trace: BoundaryTrace, pairs: Sequence[ContactState], share: float) -
 
 
 def at_limit(mesh: ng.Mesh, degree: int) -> Mask:
-    """Elements (ne,) at segments of curved edges whose halves no geometry kernel resolves.
-
-    `degree` is the one of the curves that the mesh will have.
-    """
+    """Elements (ne,) at segments, of curves of a `degree`, whose halves no kernel resolves."""
     limit = np.zeros(mesh.ne, dtype=bool)
     if degree > 1:  # straight segments have no middles to place
         short = resolved_lengths(mesh) < MIN_HALVED_LENGTH
@@ -61,10 +58,7 @@ def warn_of_limit(trace: BoundaryTrace, *, ends: bool) -> None:
 
 
 def below_resolution(mesh: ng.Mesh, places: Array) -> Mask:
-    """Elements (ne,) that lie at `places` (k, 2) where refinement does not help, and are small.
-
-    All within a thousandth of the mesh's extent of one.
-    """
+    """Elements (ne,) within a thousandth of the extent of `places` (k, 2) of infinite energy."""
     view = MeshArrays(mesh)
     radius = RESOLUTION_RADIUS * np.ptp(view.vertices, axis=0).max()
     result = np.zeros(mesh.ne, dtype=bool)

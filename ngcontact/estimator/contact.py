@@ -51,10 +51,7 @@ MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
 def covered_parts(
     boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, whole: int
 ) -> Parts:
-    """Parts of both bodies' boundaries that face each other, two of every piece.
-
-    The first `whole` ones are segments whose ends face the ends of another.
-    """
+    """Parts of both bodies that face each other, two a piece; the first `whole` are segments."""
     segment = line.segments[pieces.local]
     own = Parts(segment, pieces.start, pieces.stop)
     if line.contact.primary is None:
@@ -386,10 +383,7 @@ class _Side:
 def _side(
     solution: ScaledSolution, points: FacingPoints, pressure: Array, meets: Mask, *, own: bool
 ) -> _Side:
-    """The tractions of the secondary, or those of the primary; `pressure` (k,) is pi_h or -pi_h.
-
-    They count where a segment `meets` (k,) the other body.
-    """
+    """Tractions of one body where segments meet the other; `pressure` (k,) is pi_h or -pi_h."""
     boundary, d = solution.boundary, points.direction
     here = points.own if own else points.facing
     segment, s, weight = here
@@ -450,11 +444,7 @@ def _gap_squares(
     full: Mask,
     stiffness: Array,
 ) -> tuple[Array, Array]:
-    """Squares (k,) of complementarity and of penetration, per unit of s or eta.
-
-    `full` (k,) is whether all nodes of the segment are in contact, `stiffness` (k,) that of the
-    softer body.
-    """
+    """Squares (k,) of complementarity and penetration, per unit of s or eta, by the softer body."""
     boundary, contact = solution.boundary, line.contact
     segment, s, _ = points.own
     u = boundary.evaluate(solution.displacement, segment, s)

@@ -225,10 +225,7 @@ def _window(zone: Array, low: Array, high: Array) -> Window:
 
 
 def close_ups(scenes: Sequence[Scene]) -> list[Window]:
-    """Windows on the small contact zones of one or more scenes, those of large forces first.
-
-    Zones whose windows overlap share one. Zones that are large in the whole picture have none.
-    """
+    """Windows on the small contact zones of scenes, one where they overlap, large forces first."""
     low, high = _corners(scenes)
     groups: list[Array] = []
 
@@ -413,10 +410,7 @@ def shown_part(solution: Solved) -> Array | None:
 
 
 def _shown_parts(solution: Solved) -> list[Array]:
-    """Ends (2,) of the intervals of the coordinate in which pressures are shown.
-
-    One for each zone where zones are small and far apart, otherwise one.
-    """
+    """Intervals (2,) of the coordinate to show: one for each small zone if these are far apart."""
     lines, whole = contact_lines(solution), shown_part(solution)
     if whole is None:
         every = np.concatenate([s for *_, s in lines] or [np.zeros(1)])
@@ -501,10 +495,7 @@ def colour_and_mark(pair: int) -> tuple[str, str]:
 
 
 def finish_pressures(axes: Axes, style: Style, part: Array, names: Iterable[str]) -> None:
-    """Labels, and the given profiles over the pressures; functions on the interval `part` (2,).
-
-    The coordinate has one of the `names`.
-    """
+    """Labels, by `names` of the coordinate, and the given profiles, on an interval `part` (2,)."""
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     for k, (label, profile) in enumerate(style.profile.items()):
         if callable(profile):

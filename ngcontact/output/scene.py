@@ -232,11 +232,7 @@ class SymmetryLine:
 
 
 def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) -> SymmetryLine:
-    """The line of symmetry on which the boundary `pattern` lies.
-
-    Raises ``ValueError`` where there is no such boundary, it is not on one line, points of it move
-    across that line, or bodies lie on both sides of it.
-    """
+    """The line of symmetry on which a boundary lies; raises ``ValueError`` where it is none."""
     region = mesh.Boundaries(pattern)
     if not any(region.Mask()):
         names = sorted(set(mesh.GetBoundaries()))

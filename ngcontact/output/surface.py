@@ -48,11 +48,7 @@ class ContactSurface:
         )
 
     def values(self, values: Array) -> Array:
-        """Values (n,) at the nodes, of `values` (m,) at contact points.
-
-        Vertices of order 2, which are none, as `contact.with_vertices` has them; what has no value
-        is NaN.
-        """
+        """Values (n,) of `values` (m,) at contact points, at other nodes means or NaN."""
         rows, found = self.row[self.nodes], np.empty(len(self.row))
         size = self.trace.sizes(self.facets)
         known = np.append(values, np.nan)[rows]

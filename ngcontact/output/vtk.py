@@ -187,10 +187,7 @@ def _bodies(solution: Estimated) -> pyvista.UnstructuredGrid:
 
 
 def _contact(solution: Solved) -> pyvista.PolyData:
-    """Contact points with lines, of solids triangles, between neighbours.
-
-    Some corners of the triangles of solids are no contact points.
-    """
+    """Contact points with lines between them, of solids triangles with other corners, too."""
     import pyvista
 
     points, m, solid = solution.points, len(solution.points), solution.mesh.dim == 3

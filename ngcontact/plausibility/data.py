@@ -73,10 +73,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
 
 
 def _extremes(problem: Problem, trace: BoundaryTrace) -> tuple[Array, Array, Index, Index]:
-    """Least and largest prescribed values (d, nv) at vertices, and the numbers of their supports.
-
-    By components; infinite where none is prescribed. Of equal values the first support counts.
-    """
+    """Least and largest prescribed values (d, nv) at vertices, or infinite, and their supports."""
     shape = problem.dim, trace.mesh.nv
     low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
     least, most = np.zeros((2, *shape), dtype=np.intp)
@@ -97,10 +94,7 @@ def _extremes(problem: Problem, trace: BoundaryTrace) -> tuple[Array, Array, Ind
 def warn_of_implausible(
     problem: Problem, mesh: ng.Mesh, order: int, contradictory: Sequence[Contradiction]
 ) -> None:
-    """Warn of elements that lock, loads that are nowhere, supports that contradict, laws that jump.
-
-    Once, of the first mesh; of `contradictory` supports at the first corner of each two.
-    """
+    """Warn of elements that lock, loads nowhere, supports that contradict, laws that jump."""
     warn_of_locking(problem, mesh, order)
     warn_of_data(problem, mesh, order)
     warned: set[tuple[str, str]] = set()

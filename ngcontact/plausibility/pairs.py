@@ -363,10 +363,7 @@ def _held_apart(solution: Solved, state: ContactState) -> str:
 
 
 def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
-    """Message where bodies penetrate each other between contact points; "" elsewhere.
-
-    Surfaces are those of the mesh. `peak` is the largest pressure of all pairs.
-    """
+    """Message where bodies penetrate each other, by pressures over a `peak`; "" elsewhere."""
     trace = solution.discrete.space.trace
     if state.line.contact.bilateral or state.active.all():
         return ""
@@ -407,10 +404,7 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
 
 
 def inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> Array:
-    """Angles (m,) in radians between `xi` (d,) and the surfaces at contact points.
-
-    The smaller one of both surfaces, of each the normal that is nearest to `xi`; 0 at open points.
-    """
+    """Least angles (m,), radians, between `xi` (d,) and both surfaces; 0 at open points."""
     line, cosine = state.line, np.full(len(state.active) + 1, -1.0)
     rows, segments = line.rows[state.touched], line.segments[state.touched]
     np.maximum.at(cosine, rows.ravel(), trace.exact_normal(*trace.at_nodes(segments)) @ xi)

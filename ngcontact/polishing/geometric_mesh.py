@@ -81,10 +81,7 @@ class GeometricMesh:
         return int(found[0]) if len(found) else -1
 
     def _facing(self, vertex: int, far: int, places: Array) -> Array | None:
-        """Points (k, 2) that face `places` (k, 2) of the secondary's side from `vertex` to `far`.
-
-        None where no segment of the primary faces that.
-        """
+        """Points (k, 2) that face `places` (k, 2) between two vertices; None where nothing does."""
         there = self._between(int(self.partner[vertex]), int(self.partner[far]))
         if there < 0:
             return None
@@ -94,10 +91,7 @@ class GeometricMesh:
         return opposite(self.contacts[int(self.pair[own])], places, slope, facing)[1]
 
     def moved(self, end: EndOfContact, distance: float) -> GeometricMesh:
-        """The mesh with an end of contact moved by a `distance` along its edge, outwards.
-
-        The vertex that faces it moves along.
-        """
+        """The mesh with an end of contact, and what faces it, moved outwards by a `distance`."""
         vertices = self.vertices.copy()
         edge = self.edges[int(self.boundaries[self._between(end.vertex, end.closed)])]
         outwards = vertices[end.opened] - vertices[end.vertex]
@@ -111,10 +105,7 @@ class GeometricMesh:
         return replace(self, vertices=vertices)
 
     def with_layers(self, vertex: int, ratio: float, count: int) -> GeometricMesh:
-        """The mesh with so many layers more at a vertex, and at the one that faces it.
-
-        The layers of facing vertices face each other.
-        """
+        """The mesh with layers more at a vertex and at the one that faces it, face to face."""
         mesh, new = self._cut(vertex, ratio, count, {})
         facing = int(self.partner[vertex])
         if facing < 0:
@@ -213,10 +204,7 @@ def _half_length(line_ends: Transitions, run: Index, x: Array) -> float:
 
 
 def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) -> GeometricMesh:
-    """Coarse mesh with vertices at the ends of contact of a solution, finest there.
-
-    Its segments are in contact where those of the solution are; `extent` is that of the bodies.
-    """
+    """Coarse mesh with vertices at the ends of contact of a solution, in contact where that is."""
     places, sizes = [], []
     for state in pairs:
         ends, x = state.transitions, state.line.position

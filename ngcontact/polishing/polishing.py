@@ -194,10 +194,7 @@ def _error(values: list[Array]) -> float:
 
 
 def _followed(mesh: GeometricMesh, solution: Solved) -> tuple[float, GeometricMesh]:
-    """Share of the segments beside them by which ends of contact are off; the mesh with them moved.
-
-    The `solution` is of the mesh with its layers.
-    """
+    """Share of the segments beside by which ends of contact are off; the mesh with them moved."""
     largest, moved = 0.0, mesh
     for end in mesh.ends:
         beside = mesh.vertices[[end.closed, end.opened]] - mesh.vertices[end.vertex]
@@ -279,10 +276,7 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
 
 
 def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
-    """Length by which a zone ends too far out, by the singular coefficient of the gap there.
-
-    The `solution` is of the `mesh` with layers at its ends.
-    """
+    """Length by which a zone ends too far out, by the singular coefficient of the gap there."""
     state, x = solution.pairs[end.pair], mesh.vertices[end.vertex]
     reach = mesh.vertices[end.opened] - x
     size = float(np.linalg.norm(reach))
@@ -298,10 +292,7 @@ def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
 
 
 def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
-    """Contradiction of contact between nodes: tension in the zone, or penetration; None if none.
-
-    Stresses are not known on segments that end at the vertices `tips` of layers.
-    """
+    """Tension or penetration between nodes, away from `tips` of layers; None without any."""
     trace, order = solution.discrete.space.trace, solution.order
     s, _ = gauss(2 * SAMPLES_PER_NODE * order)
     reach = np.abs(solution.displacement.vec.FV().NumPy()).max()

@@ -22,10 +22,7 @@ Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction
 
 
 def boundary_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
-    """Return which of r boundary region numbers a name or pattern selects, bool (r,).
-
-    One name may stand on several numbers. Nothing selected is not an error here.
-    """
+    """Return which of r boundary region numbers a name or pattern selects, bool (r,)."""
     return _mask(mesh.Boundaries, pattern)
 
 
