@@ -54,6 +54,9 @@ from .nodal import (
 from .projection import MATCHING_DISTANCE
 
 MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which hats take its place
+# Sizes of a row's coefficients, which add up to 1, from which it extrapolates: 5 where facets face
+# wholly at order 3. From 20 on multigrid takes more V-cycles.
+LARGEST_SUM = 15.0
 # Slope of a gap that rows follow beyond the part of a segment that faces. No row asks for less than
 # the gap at its node or the least one of its segments less this share of their lengths: of strongly
 # curved sides psi, which is negative in places, made negative means of gaps that are positive.
@@ -217,9 +220,9 @@ def with_dual_rows(
     segments all match keeps the row at its node to the last bit.
 
     Rows of nodes `held` along their directions would have to be unknowns of the primary, of which
-    a coarser one has too few; those of nodes of solids of whose weight less than `MIN_COVERED`
-    faces extrapolate, with large entries of both signs. The psi of these nodes are added to those
-    of nodes beside, so that the sum of all stays 1, as at the ends of interfaces in mortar methods.
+    a coarser one has too few; those of nodes of which little faces extrapolate, with large entries
+    of both signs. The psi of these nodes are added to those of nodes beside, so that the sum of all
+    stays 1, as at the ends of interfaces in mortar methods.
     """
     if len(line.facing) == 0:
         return line, facing
@@ -240,8 +243,11 @@ def with_dual_rows(
     np.add.at(nodal, line.rows[matched], line.shares[matched])
     np.add.at(whole, line.rows[line.rows >= 0], line.shares[line.rows >= 0])
     np.add.at(reached, rows[here], D[here])
+    shape = m, coupling.shape[0]
     if trace.model.dim == 3:
         fixed[:-1] |= (reached > 0) & (nodal + reached < MIN_COVERED * whole)
+        sums = from_triplets(np.ones(here.sum()), rows[here], np.flatnonzero(here), shape)
+        fixed[:-1] |= abs(sums @ coupling).sum(axis=1) > LARGEST_SUM * reached
     if fixed.any():
         rows = np.where(here, _passed_on(line, np.where(here, rows, -1), fixed), rows)
         slot = np.flatnonzero(rows != own)
@@ -271,8 +277,7 @@ def with_dual_rows(
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
     lowest[at_nodes] = -np.inf
-    scale, shape = across / weight[point], (m, coupling.shape[0])
-    mean = from_triplets(scale, point, np.flatnonzero(here), shape)
+    mean = from_triplets(across / weight[point], point, np.flatnonzero(here), shape)
     position = line.position
     if isinstance(trace, FacetTrace):  # where forces act, so that moments balance
         place = np.zeros((coupling.shape[1], 3))
