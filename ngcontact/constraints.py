@@ -26,7 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from .arrays import Array, Columns, Index, Mask, dense, from_triplets, rows_of
 
 ROW_DIFFERENCE = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
-SOFT_CONDITION = 1e3  # condition number of rows up to which softer bodies in front host them
+SOFT_CONDITION = 1e2  # condition number of rows up to which softer bodies in front host them
 RING_CONDITION = 1e6  # condition number from which rows that refer to each other are dependent
 MIN_PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if others have more
 MIN_SINE = 1e-6  # sine below which two conditions at one node are the same

@@ -237,3 +237,34 @@ def test_round_bodies_under_a_wide_secondary_are_not_pushed_apart(body, order):
     other = solve(replace(problem, contact=exchanged), maxh=0.5, order=order)
     assert solution.pairs[0].line.gap.min() > -0.02 * 0.5
     assert solution.energy == pytest.approx(other.energy, rel=0.3)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("stiffness", [1e3, 1e6])
+def test_a_wide_secondary_that_is_much_stiffer(stiffness):
+    """A soft ball does not host rows that its nodes hardly tell apart.
+
+    It did: no solution at 1e3, and at 1e6 30 times the energy, or forces 2e-5 out of balance.
+    Measured: they balance to 4e-10 and 1e-8, and the energies are 1.1977594e-4 and 1.1990983e-4; on
+    a rigid plane, with points of the ball, 1.15e-4.
+    """
+    ball = occ.Sphere((0, 0, 1), 1) * occ.Box((-2, -2, -1), (2, 2, 1))
+    ball.solids.name, ball.faces.name, ball.faces.Max(occ.Z).name = "ball", "rim", "high"
+    block = occ.Box((-1.5, -1.5, -1.5), (1.5, 1.5, 0))
+    block.solids.name, block.faces.name = "block", "block_side"
+    block.faces.Max(occ.Z).name, block.faces.Min(occ.Z).name = "top", "bottom"
+    axis = occ.Axis((0, 0, 0), occ.gp_Dir(1, -1, 2))
+    turned = [body.Rotate(axis, 71) for body in (ball, block)]
+    [high] = (face.center for face in turned[0].faces if face.name == "high")
+    up = np.array([high.x, high.y, high.z])
+    problem = Problem(
+        geometry=occ.OCCGeometry(occ.Compound(turned)),
+        materials={"ball": Elastic(1.0, 0.3), "block": Elastic(stiffness, 0.3)},
+        displacement={"bottom": (0, 0, 0), "high": tuple(-0.03 * up)},
+        contact=[Contact("top", "rim", direction=tuple(up))],
+    )
+    solution = solve(problem, maxh=0.4, order=3)
+    held, pressed = (solution.reactions[name] @ up for name in ("bottom", "high"))
+    assert held == pytest.approx(-pressed, rel=1e-5)
+    assert solution.force.sum() == pytest.approx(held, rel=1e-5)
+    assert solution.energy == pytest.approx(1.15e-4, rel=0.1)
