@@ -94,16 +94,15 @@ class DualProblem:
                 f"no equilibrated stress was found: the residual relative to the largest stress is "
                 f"{residual:.1e}"
             )
-        have = self.given.tractions_of(found.s)
-        missed = self.given.missed(have, lines, found.pressure, scale)
+        given = self.given
+        have = found.s.tractions(cells.owner[given.side], given.x, given.normal)
+        missed = given.missed(have, lines, found.pressure, scale)
         forces, moduli = (
             by_triangle(elements, [getattr(e, name) for e in elements])
             for name in ("missed", "modulus")
         )
         loads = oscillation_norms(cells, forces, moduli, missed)
-        work = sum(
-            self.given.work(have, one.side, one.direction, one.amount) for one in self.prescribed
-        )
+        work = sum(given.work(have, x.side, x.direction, x.amount) for x in self.prescribed)
         for line, p in zip(lines, found.pressure, strict=True):
             work -= float((line.force(p) * line.gap).sum())
         return AdmissibleStress(
@@ -182,10 +181,10 @@ def _bound(
     fixed = [name for name, values in problem.displacement.items() if None not in values]
     degree = trace.order + LIFTING_DEGREES
     reaches = [pressure_support(trace, displacement, pair, degree) for pair in pairs]
-    both = rough_places(problem, trace), new_vertices(trace, reaches, beside)
-    cuts = np.concatenate([x for x, _ in both]), np.concatenate([s for _, s in both])
+    both = zip(rough_places(problem, trace), new_vertices(trace, reaches, beside), strict=True)
+    segment, s = (np.concatenate(parts) for parts in both)
     supported = trace.segments(*fixed)
-    cells, largest_size = cells_of(trace, cuts), force_features(problem, trace)
+    cells, largest_size = cells_of(trace, (segment, s)), force_features(problem, trace)
     for load in loads_of(problem, trace.mesh) if beside else ():
         if load.kind == "force" and (forces := load.where_rough(trace.order)) is not None:
             size = np.where(forces.rough, SampledElements(trace.mesh, 2).sizes / 4, np.inf)

@@ -64,8 +64,7 @@ class Cells:
     @cached_property
     def diameters(self) -> Array:
         """Longest straight side (n,), lengths."""
-        x = self.corners
-        return np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max(axis=1)
+        return _lengths(self.corners).max(axis=1)
 
     @cached_property
     def backward(self) -> Mask:
@@ -181,11 +180,6 @@ class Places:
     def corners(self) -> Array:
         """Corners (b, 3, 2) of the triangles, lengths."""
         return self.cells.corners[self.at]
-
-    def part(self, rows: Index, cells: Cells, at: Index) -> Places:
-        """Those of the triangles `rows` (r,), which are `at` (r,) of other `cells`."""
-        x, slopes, weight = self.x[rows], self.slopes[rows], self.weight[rows]
-        return Places(cells, at, self.local, x, slopes, weight)
 
     @cached_property
     def affine(self) -> Array:

@@ -18,13 +18,13 @@ import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index, Mask, rows_of
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, numbers, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, alike, places
-from .polynomials import CORNERS, balancing, coordinates, edges, projected, scalars, stresses
+from .polynomials import CORNERS, balancing, coordinates, edges, scalars, stresses
 
 TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
 CURVED_DEGREES = 2  # degrees by which stresses on triangles with a curved side are higher
@@ -96,13 +96,10 @@ class Element:
     def part(self, rows: Index, cells: Cells, at: Index, mu: Multipliers) -> Element:
         """Its triangles `rows` (r,), which are `at` (r,) of other `cells`, with multipliers mu."""
         names = "compliance strain missed modulus combined N own g beyond".split()
-        return replace(
-            self,
-            places=self.places.part(rows, cells, at),
-            basis=self.basis.part(rows),
-            dofs=mu.of(cells.sides[at])[0].reshape(len(at), -1),
-            **{name: getattr(self, name)[rows] for name in names},
-        )
+        places = replace(rows_of(self.places, rows, "x", "slopes", "weight"), cells=cells, at=at)
+        dofs = mu.of(cells.sides[at])[0].reshape(len(at), -1)
+        part = rows_of(self, rows, *names)
+        return replace(part, places=places, basis=self.basis.part(rows), dofs=dofs)
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
@@ -116,8 +113,7 @@ class Element:
         """These triangles for a displacement of `strain` (b, q, v), without body forces."""
         basis = replace(self.basis, force=np.zeros_like(self.basis.force))
         T, _ = basis.at(self.places.affine)
-        rows, rest = _weighted(T, self.places.weight, self.compliance, strain)
-        g, beyond = _nearest(rows, self.combined, rest)
+        _, g, beyond = _nearest(T, self.places.weight, self.compliance, strain, self.combined)
         none = {name: np.zeros_like(getattr(self, name)) for name in ("missed", "own")}
         return replace(self, basis=basis, strain=strain, g=g, beyond=beyond, **none)
 
@@ -127,7 +123,7 @@ class Element:
         At (a, b) `local` (k, q, 2), or (q, 2) in each.
         """
         (A, P), s_p = self.basis.part(some).at(local)
-        c = self.combined[some] @ c[some][..., None]
+        c = (self.combined @ c[..., None])[some]
         *_, k, m = P.shape
         s = A @ (P.reshape(*P.shape[:-3], -1, m) @ c).reshape(len(c), -1, k, 1)
         return np.asarray(s[..., 0] + s_p)
@@ -326,14 +322,17 @@ def projection(force: ng.CoefficientFunction, points: Places, degree: int) -> tu
     And L2 norms (b,) of what they miss, times the measure; axially about an axis.
     """
     P, values = scalars(degree, points.corners, points.x), points.evaluate(force)
-    found = projected(P, points.weight, values)
+    weighted = P.transpose(0, 2, 1) * points.weight[:, None]
+    mass = weighted @ P
+    found = np.linalg.solve(mass, weighted @ values)
+    found += np.linalg.solve(mass, weighted @ (values - P @ found))
     weight = points.weight * points.cells.measure(points.x)
     axial = points.cells.trace.model.extent
     missed, size = (
         np.sqrt((weight * (x[..., axial:] ** 2).sum(axis=2)).sum(axis=1))
         for x in (values - P @ found, values)
     )
-    return found, np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
+    return np.asarray(found), np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
 
 
 def _element(
@@ -357,9 +356,7 @@ def _element(
     if axial:
         s_p[..., 2] += hoop
     rest = strain - (compliance @ s_p[..., None])[..., 0]
-    rows, rest = _weighted(T, points.weight, compliance, rest)
-    combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
-    g, beyond = _nearest(rows, combined, rest)
+    combined, g, beyond = _nearest(T, points.weight, compliance, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
     N, own, dofs = _moments(cells, mu, at, basis)
@@ -379,31 +376,27 @@ def _element(
     )
 
 
-def _weighted(
-    T: tuple[Array, Array], weight: Array, compliance: Array, strain: Array
-) -> tuple[Array, Array]:
-    """Stresses T, as of `stresses`, as rows (b, q v, n) whose products are those of C^-1's norm.
+def _nearest(
+    T: tuple[Array, Array],
+    weight: Array,
+    compliance: Array,
+    strain: Array,
+    combined: Array | None = None,
+) -> tuple[Array, Array, Array]:
+    """`Element.combined`, made where it is not known, `.g` and `.beyond` for a `strain` (b, q, v).
 
-    And a `strain` (b, q, v) as one (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
-    (b, q, v, v) or (b, 1, v, v).
+    For stresses T, as of `stresses`, in the norm of C^-1, `compliance`, by a `weight` (b, q).
     """
-    (A, P), root = T, np.sqrt(weight)[..., None, None]
-    L = np.linalg.cholesky(compliance)
-    strain = (np.linalg.inv(L) @ (root * strain[..., None])).reshape(len(weight), 1, -1)
-    rows = (root * (L.swapaxes(2, 3) @ A)) @ P
-    return rows.reshape(len(weight), -1, P.shape[-1]), strain
-
-
-def _nearest(rows: Array, combined: Array, rest: Array) -> tuple[Array, Array]:
-    """`Element.g` and `.beyond` for strains `rest` (b, 1, k).
-
-    The stresses `rows` (b, k, n), `combined` (b, n, m), are orthonormal.
-    """
+    (A, P), root, L = T, np.sqrt(weight)[..., None, None], np.linalg.cholesky(compliance)
+    rest = (np.linalg.inv(L) @ (root * strain[..., None])).reshape(len(weight), 1, -1)
+    rows = ((root * (L.swapaxes(2, 3) @ A)) @ P).reshape(len(weight), -1, P.shape[-1])
+    if combined is None:
+        combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
     g = np.zeros((len(rows), 1, combined.shape[2]))
     for _ in range(2):  # once more, as they are orthonormal but for round-off
         more = rest @ rows @ combined
         g, rest = g + more, rest - more @ combined.swapaxes(1, 2) @ rows.swapaxes(1, 2)
-    return g[:, 0], (rest**2).sum(axis=(1, 2))
+    return combined, g[:, 0], (rest**2).sum(axis=(1, 2))
 
 
 def _moments(cells: Cells, mu: Multipliers, at: Index, basis: Basis) -> tuple[Array, Array, Index]:

@@ -119,17 +119,6 @@ def scalars(degree: int, corners: Array, x: Array) -> Array:
     return np.asarray(a[..., i] * b[..., j])
 
 
-def projected(P: Array, weight: Array, values: Array) -> Array:
-    """Coefficients (b, m, d) of the polynomials `P` (b, q, m) that are nearest to `values`.
-
-    In the mean square at q points with `weight` (b, q), where F has `values` (b, q, d).
-    """
-    weighted = P.transpose(0, 2, 1) * weight[:, None]
-    mass = weighted @ P
-    found = np.linalg.solve(mass, weighted @ values)
-    return np.asarray(found + np.linalg.solve(mass, weighted @ (values - P @ found)))
-
-
 def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) -> Array:
     """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force.
 

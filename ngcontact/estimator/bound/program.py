@@ -134,17 +134,13 @@ class DualProgram:
             if not MOMENT_ROUND_OFF * largest < size < most:
                 break
             last = size
-            y = self._answer(right, active)
+            self.systems.restart(replace(p, b=right, g=np.zeros_like(p.g)))
+            y = self.systems.approach(active)
         mass = [x.mass for x in self.lines]
         ends = np.cumsum([m.size for m in mass])[:-1]
         each = zip(np.split(force, ends), mass, strict=bool(mass))
         pressure = [f.reshape(m.shape) / m for f, m in each]
         return Balanced(s, pressure, left, float(np.abs(idle).sum()))
-
-    def _answer(self, load: Array, active: Mask) -> Array:
-        """Unknowns (d,) under a `load` (d,), nearly, 0 at the rows `active` (m,)."""
-        self.systems.restart(replace(self.program, b=load, g=np.zeros_like(self.program.g)))
-        return self.systems.approach(active)
 
     def _on_free_motions(self, load: Array) -> Array:
         """The part (d,) of a `load` (d,) that does work on free motions.

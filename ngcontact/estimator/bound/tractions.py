@@ -13,7 +13,7 @@ from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem
 from ...quadrature import loads_of
 from .cells import Cells
-from .elements import Multipliers, Stress, traces
+from .elements import Multipliers, traces
 from .facing import DATA_DEGREE, POINTS, WEIGHTS, FacingSides, jump
 
 FINEST_PARTS = 16  # of a side of an element: cells do not become smaller
@@ -33,10 +33,6 @@ class BoundaryData:
     x: Array  # (m, j, 2) points, lengths
     normal: Array  # (m, j, 2) unit normals, out of the bodies
     loads: Array  # (m, j, 2) given tractions
-
-    def tractions_of(self, stress: Stress) -> Array:
-        """Tractions (m, j, 2) of a stress."""
-        return stress.tractions(self.cells.owner[self.side], self.x, self.normal)
 
     def moments(self, mu: Multipliers) -> tuple[Array, Mask]:
         """Moments (d,) of the loads with the multipliers, and which of these are fixed, (d,).
