@@ -44,13 +44,11 @@ def force_bar(
     """
     dual, stress, B = proof.dual, proof.stress, proof.bound
     cells, lines, each, kappa = dual.cells, dual.program.lines, iter(directions), 0.0
-    excess, c = [], []
+    excess = []
     for f in lines:
         e = np.zeros(2) if f.pair is None else next(each)
-        values, coefficients = _excess(cells, G, f, e)
-        excess.append(values)
-        c.append(coefficients)
-        kappa = max(kappa, _bare(f, c[-1]), _beside(cells, displacement, G, f, e))
+        excess.append(_excess(cells, G, f, e))
+        kappa = max(kappa, _bare(f, excess[-1][1]), _beside(cells, displacement, G, f, e))
     if not kappa < np.inf:
         raise ValueError(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
@@ -62,16 +60,16 @@ def force_bar(
     moments = np.zeros_like(dual.moments)
     test = replace(dual, given=given, elements=elements, moments=moments)
     nearest, ratio = _within(test, stress.pressure, np.inf)
-    t = test.admissible(nearest)
-    costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
-    limit = max(kappa, KAPPA_GROWTH * costless)
+    size = float(np.linalg.norm(nearest.s.norms()[0]))
+    limit = max(kappa, KAPPA_GROWTH * size / B if B > 0 else 0.0)
     if ratio > limit:
         nearest, ratio = _within(test, stress.pressure, limit, nearest)
-        t = test.admissible(nearest)
-    kappa = max(kappa, costless, ratio)
+    t = test.admissible(nearest)
+    size = float(np.linalg.norm(t.distance + t.loads))
+    kappa = max(kappa, ratio, size / B if B > 0 else 0.0)  # up to M / B it costs nothing
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     r = []
-    for f, x, y in zip(lines, excess, c, strict=True):
+    for f, (x, y) in zip(lines, excess, strict=True):
         y = np.clip(y, -kappa * f.lifted_gap, kappa * f.lifted_gap)
         r.append(x - y @ bernstein(y.shape[1] - 1, POINTS).T)
     held = [replace(one, amount=np.zeros_like(one.amount)) for one in dual.prescribed]
