@@ -40,6 +40,7 @@ SYMMETRIC = 1e-10  # difference of A and its transpose, relative to the largest 
 TIE = 1e-13  # relative size below which a force or a slack keeps its state
 CLEAR_TIE = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
+ROW_RESIDUAL = 1e-8  # of active rows, relative to their terms: in vain in dependent ones
 PATIENCE = 10  # full switches allowed without fewer violated rows: p of Judice and Pires
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
@@ -251,7 +252,10 @@ def minimise(
 
 def _matrix(name: str, M: Matrix, columns: int | None) -> sp.csr_array:
     """`M` as a CSR array, checked."""
-    matrix = sp.csr_array(M if sp.issparse(M) else np.atleast_2d(M), dtype=float)
+    M = M if sp.issparse(M) else np.atleast_2d(M)
+    if np.iscomplexobj(M):
+        raise ValueError(f"{name} is complex; it must be real")
+    matrix = sp.csr_array(M, dtype=float)
     if matrix.ndim != 2:  # SciPy has sparse vectors, too
         raise ValueError(f"{name} has shape {matrix.shape}; it must have rows and columns")
     if columns is not None and matrix.shape[1] != columns:
@@ -355,7 +359,7 @@ def solve_qp(
     ------
     ValueError
         Shapes that do not fit, entries that are not finite, A not symmetric or not positive
-        definite.
+        definite, rows that are active together and depend on or contradict each other.
     ConvergenceError
         See `minimise`.
 
@@ -376,5 +380,12 @@ def solve_qp(
         raise ValueError(f"active is {active!r}; it must be {m} booleans, one per row of B")
     first = np.concatenate([start, program.equality[m:]])
     result = minimise(BorderedSystems(program, _factor(program.K)), first)
+    excess = program.left_sides(result.u) - program.g
+    excess = np.where(result.active, np.abs(excess), excess)
+    if (excess > ROW_RESIDUAL * (abs(program.R) @ np.abs(result.u) + np.abs(program.g))).any():
+        raise ValueError(
+            f"row {int(excess.argmax())} of B, E is missed by {excess.max():.3g}: rows that are "
+            "active together contradict or depend on each other; they must be independent"
+        )
     force, multiplier = np.split(result.force, [m])
     return replace(result, force=force, multiplier=multiplier, active=result.active[:m])
