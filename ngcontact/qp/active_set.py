@@ -379,10 +379,13 @@ def solve_qp(
     if start.shape != (m,) or start.dtype != bool:
         raise ValueError(f"active is {active!r}; it must be {m} booleans, one per row of B")
     first = np.concatenate([start, program.equality[m:]])
-    result = minimise(BorderedSystems(program, _factor(program.K)), first)
+    systems = BorderedSystems(program, _factor(program.K))
+    result = minimise(systems, first)
     excess = program.left_sides(result.u) - program.g
     excess = np.where(result.active, np.abs(excess), excess)
-    if (excess > ROW_RESIDUAL * (abs(program.R) @ np.abs(result.u) + np.abs(program.g))).any():
+    terms = abs(program.R) @ np.abs(result.u) + np.abs(program.g)
+    terms += np.max(np.abs(result.force) / systems.stiffness(), initial=0.0)
+    if (excess > ROW_RESIDUAL * terms).any():
         raise ValueError(
             f"row {int(excess.argmax())} of B, E is missed by {excess.max():.3g}: rows that are "
             "active together contradict or depend on each other; they must be independent"
