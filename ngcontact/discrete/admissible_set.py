@@ -245,13 +245,18 @@ class AdmissibleSet:
 
 
 def admissible_set(
-    space: Space, conditions: Conditions, found: Sequence[ContactLine]
+    space: Space, conditions: Conditions, found: Sequence[ContactLine], passed: Index
 ) -> AdmissibleSet:
-    """K_h for the `conditions` of supports and the contact points `found` of each pair."""
+    """K_h for the `conditions` of supports and the contact points `found` of each pair.
+
+    Rows `passed` (k,) become unknowns of the bodies that they face.
+    """
     trace = space.trace
     lines, rows = merged(list(found), contact_rows(list(found), trace))  # (2.3), (2.5), (2.10)
     length = float(np.abs(trace.curve).max())
     stiffness = space.stiffness() if rows.coupling.nnz else None  # else all rows have one host
+    if stiffness is not None:
+        stiffness[rows.node[passed]] = np.inf
     basis = change_of_basis(conditions, rows, length, stiffness)
     if space.inner.any():  # of these nothing is left in the matrix
         basis = replace(basis, fixed=basis.fixed | space.inner)

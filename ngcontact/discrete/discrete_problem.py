@@ -261,9 +261,16 @@ def discretise(
         previous = None
     stiffness = None if previous is None else previous.space
     space = assemble(problem, trace, element, nodal, stiffness)  # V_h
-    admissible = admissible_set(space, conditions, found)
-    basis, rows = admissible.basis, admissible.rows
-    rigid, f = equilibrium(problem, space, conditions, rows, basis, admissible.around)  # Remark 3.7
+    passed = np.zeros(0, dtype=np.intp)
+    for _ in range(2):
+        admissible = admissible_set(space, conditions, found, passed)
+        basis, rows, around = admissible.basis, admissible.rows, admissible.around
+        rigid, f = equilibrium(problem, space, conditions, rows, basis, around)  # Remark 3.7
+        # Of a body one element thick that is in contact on both sides rows are all unknowns.
+        pinned = rigid is not None and np.isin(basis.unknown, rigid.null_space.pins)
+        passed = basis.kept[np.flatnonzero(pinned)]
+        if not passed.size:
+            break
     space = replace(space, f=f)
     T = space.basis @ basis.T
     b = T.T @ space.condensed(space.right_side)

@@ -374,6 +374,7 @@ def solve_qp(
     ([0.25, 1.0], [1.5], [1, 0])
     """
     program = _program(A, f, B, g, E, e)
+    assert program.R is not None
     m = np.count_nonzero(~program.equality)
     start = np.zeros(m, dtype=bool) if active is None else np.asarray(active)
     if start.shape != (m,) or start.dtype != bool:

@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, Columns, Index, Mask, dense
 
 NULL_SPACE_TOLERANCE = 1e-8  # singular value, of motions of size 1, below which nothing resists
+ROW_PIN = 1e-6  # of a motion at free unknowns, below which the value of a row holds it better
 WEAK_RESISTANCE = 1e-2  # ... up to which rows resist so little that a factorisation loses digits
 CACHE_ROWS = 1 << 14  # rows that are copied at a time: the copy stays in the cache
 
@@ -92,10 +93,11 @@ def pinned_null_space(
 
     `combinations` (r, l) of the motions no row resists; `functionals` (l, n) determine these. The
     unknowns `rows` (m,) are the values of contact rows, those that are `fixed` (n,) are given.
+    Motions that move no other unknown of a body are pinned at values of rows.
     """
-    free = ~fixed
-    free[rows] = False
-    places = np.flatnonzero(free)
+    share = (~fixed).astype(float)
+    share[rows] *= ROW_PIN
+    places, every_place = np.flatnonzero(share == 1), np.flatnonzero(share)
     lineal = motions @ combinations
     lineal[rows] = 0.0
     held = separated(lineal, places)
@@ -111,8 +113,8 @@ def pinned_null_space(
     for part in _apart(rest):
         moves = np.zeros(len(fixed), dtype=bool)
         moves[part.nonzero()[0]] = True
-        at = places[moves[places]]
-        pins.append(at[separated(dense(part[at]), np.arange(at.size))])
+        at = every_place[moves[every_place]]
+        pins.append(at[separated(share[at, None] * dense(part[at]), np.arange(at.size))])
     return NullSpace(
         lineal=lineal,
         others=rest,
