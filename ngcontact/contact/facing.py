@@ -23,6 +23,7 @@ from .projection import MATCHING_DISTANCE, NEWTON_TOLERANCE, Partners, coinciden
 
 FACING_COSINE = 1e-8  # cosine between normal and direction from which a point faces the other body
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
+RIM_PARTS = 4  # chords of a curved edge on the rim of a primary
 WHOLE_SHARE = 1 - SLIVER  # ... of all its pieces, from which it faces wholly
 GAP_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
@@ -204,13 +205,38 @@ def _clipped(
     d = rays(trace, contact, facets, middle)
     far = np.full(len(facets), np.inf) if reach is None else reach
     faces = np.flatnonzero((trace.normal(facets, middle) * d).sum(axis=1) > FACING_COSINE)
-    corners, other = trace.curve[facets[faces]][:, :3], trace.curve[facing][:, :3]
-    outward = trace.side[facing, None, None] > 0
+    corners, (other, part) = trace.curve[facets[faces]][:, :3], _outlines(trace, facing)
+    outward = trace.side[facing[part], None, None] > 0
     other = np.where(outward, other, other[:, ::-1])  # anticlockwise from outside
     local, parts, number = clipping.pieces(corners, d[faces], other, far[faces])
+    number = part[number]
     start, share = np.tile(triangle.CENTRE, (len(local), 1)), np.abs(np.linalg.det(parts))
     pieces = FacingPieces(faces[local], parts, facing[number], start, share)
     return rows_of(pieces, _seen(trace, facets, pieces, d[pieces.local], facing))
+
+
+def _outlines(trace: BoundaryTrace, facing: Index) -> tuple[Array, Index]:
+    """Triangles (t, 3, 3) in place of the facets `facing` (q,), and the numbers (t,) of these.
+
+    Facets with a curved edge on the rim are fans around their middles, which follow it.
+    """
+    x, t = trace.curve[facing], np.arange(1, RIM_PARTS)[:, None] / RIM_PARTS
+    i, j = triangle.EDGES.T
+    a, b = x[:, i, None], x[:, j, None]
+    places = np.eye(3)[i, None] * (1 - t) + np.eye(3)[j, None] * t
+    shapes = triangle.lagrange(trace.geometry_order, places.reshape(-1, 3))
+    inner = np.einsum("ki,qid->qkd", shapes, x).reshape(len(x), 3, -1, 3)
+    chord = a * (1 - t) + b * t
+    edges = np.sort(trace.nodes[facing][:, triangle.EDGES], axis=2).reshape(-1, 2)
+    _, at, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    off = np.abs(inner - chord).max(axis=(2, 3))
+    bent = (count[at].reshape(-1, 3) == 1) & (off > SLIVER * np.abs(b - a).max(axis=(2, 3)))
+    points = np.concatenate([a, np.where(bent[..., None, None], inner, chord), b], axis=2)
+    middle = np.broadcast_to(x[:, None, None, :3].mean(axis=3), points[:, :, 1:].shape)
+    some, whole = np.flatnonzero(bent.any(axis=1)), np.flatnonzero(~bent.any(axis=1))
+    fans = np.stack([middle, points[:, :, :-1], points[:, :, 1:]], axis=3)[some]
+    number = np.repeat(some, 3 * RIM_PARTS)
+    return np.concatenate([x[whole, :3], fans.reshape(-1, 3, 3)]), np.append(whole, number)
 
 
 def _seen(

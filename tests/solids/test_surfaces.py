@@ -228,3 +228,26 @@ def test_facets_beside_matched_ones_have_no_area(order):
     assert solution.contact_area() == pytest.approx(1.0, rel=1e-9)
     found = ng.Integrate(solution.pressure_field(), solution.mesh.Boundaries("a_top"))
     assert found == pytest.approx(solution.force.sum(), rel=1e-9)
+
+
+def test_the_wide_side_follows_a_round_rim():
+    """The foot of a guided cylinder of radius 0.5 on a block, whose top carries the points.
+
+    With the chords of whole edges as its rim the area was 4.5 % less, with those of quarters 0.33.
+    """
+    foot = occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, 0.5, 1.2)
+    foot.faces.name, foot.solids.name = "side", "foot"
+    foot.faces.Min(occ.Z).name, foot.faces.Max(occ.Z).name = "sole", "top"
+    block = occ.Box((-1, -1, -1), (1, 1, 0))
+    block.faces.name, block.solids.name = "rest", "block"
+    block.faces.Min(occ.Z).name, block.faces.Max(occ.Z).name = "bottom", "face"
+    problem = Problem(
+        geometry=occ.OCCGeometry(occ.Compound([foot, block])),
+        materials={"foot|block": Elastic(1.0, 0.3)},
+        displacement={"bottom": (0, 0, 0)},
+        sliding="side",
+        traction={"top": 0.02},
+        contact=[Contact("face", "sole", direction=(0, 0, 1))],
+    )
+    solution = solve(problem, maxh=0.5, order=2)
+    assert solution.contact_area() == pytest.approx(0.25 * np.pi, rel=5e-3)
