@@ -71,6 +71,12 @@ def dimension_of(geometry: OCCGeometry | ng.Mesh) -> int:
                 "the geometry has no solids, and its faces lie in no plane z = const: give solids "
                 "with their volume, or faces in the plane z = 0"
             )
+        for face in geometry.shape.faces:
+            if face.mass < 0:  # Netgen fails, or never returns
+                raise ValueError(
+                    f'the face "{face.name}" is drawn clockwise, its area is {face.mass:.6g}: draw '
+                    "it anticlockwise"
+                )
         return 2
     faces = Counter(face for solid in solids for face in solid.faces)
     if len(faces) < len(set(geometry.shape.faces)):

@@ -7,7 +7,7 @@ import netgen.meshing
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt
+from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks
@@ -28,6 +28,13 @@ def shapes():
         rectangle("block", (0, 2), (0, 1), ("bottom", "right", "block_top", "left")),
         rectangle("punch", (0, 2), (1, 2), ("punch_bottom", "right", "top", "left")),
     ]
+
+
+def clockwise():
+    """Netgen tells of a triangulation, and never returns where the face is not convex."""
+    face = WorkPlane().LineTo(0, 1).LineTo(2, 1).LineTo(2, 0).Close().Face()
+    face.name = "a"
+    return OCCGeometry(face, dim=2)
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +181,7 @@ def test_contact_refuses(arguments, error, message):
         ({"force": {"block": -9.81}}, TypeError, 'force "block" = -9.81: give a pair'),
         ({"force": [("block", (0, 1))]}, TypeError, r"force = \[.*: give a dict"),
         ({"contact": [TOUCH, ("a", "b")]}, TypeError, r"contact\[1\] = \('a', 'b'\): give a Con"),
+        ({"geometry": clockwise()}, ValueError, r'the face "a" is drawn clockwise, its area is -2:'),
         ({"geometry": shapes()[0]}, TypeError, r"a Face, which OCCGeometry\(shape, dim=2\) wraps"),
         ({"sliding": 3}, TypeError, "sliding = 3: give a region name or a sequence of names"),
         ({"sliding": ""}, ValueError, 'sliding = "": give a region name'),
