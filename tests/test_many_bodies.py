@@ -126,22 +126,23 @@ def test_a_body_that_hangs_beside_changes_no_indicator():
     assert np.abs(both.indicators - alone.indicators).max() <= 1e-9 * alone.error_estimate
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_plate_one_element_thick_between_two_blocks(order):
+@pytest.mark.parametrize(("order", "thickness"), [(1, 0.09), (2, 0.09), (1, 0.01)])
+def test_a_plate_one_element_thick_between_two_blocks(order, thickness):
     """All its vertices are in contact, so that rows are all unknowns that could hold it.
 
-    With the plate as primary they are not. Energies differ by 3.7e-3 and 1.6e-3.
+    With the plate as primary they are not. Energies differ by at most 3.7e-3.
     """
+    top = 0.02 + thickness
     x, y = np.linspace(0, 1, 6), np.linspace(-0.1, 1.1, 8)
     names = {body: [f"{body}_{side}" for side in "brtl"] for body in ("low", "plate", "top")}
     mesh = mesh_of(
         [
             ("low", y, [-1.0, -0.5, 0.0], names["low"]),
-            ("plate", x, [0.01, 0.1], names["plate"]),
-            ("top", y, [0.11, 0.5, 1.0], names["top"]),
+            ("plate", x, [0.01, top - 0.01], names["plate"]),
+            ("top", y, [top, 0.5, 1.0], names["top"]),
         ]
     )
-    pairs = [Contact("plate_b", "low_t", (0, -1)), Contact("plate_t", "top_b", (0, 1))]
+    pairs = [Contact("plate_b", "low_t"), Contact("plate_t", "top_b")]
     energies = []
     for contact in (pairs, [pair.swapped() for pair in pairs]):
         problem = Problem(

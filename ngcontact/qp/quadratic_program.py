@@ -20,7 +20,6 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, Columns, Index, Mask, dense
 
 NULL_SPACE_TOLERANCE = 1e-8  # singular value, of motions of size 1, below which nothing resists
-ROW_PIN = 1e-6  # of a motion at free unknowns, below which the value of a row holds it better
 WEAK_RESISTANCE = 1e-2  # ... up to which rows resist so little that a factorisation loses digits
 CACHE_ROWS = 1 << 14  # rows that are copied at a time: the copy stays in the cache
 
@@ -87,16 +86,21 @@ def no_null_space(n: int) -> NullSpace:
 
 
 def pinned_null_space(
-    motions: Columns, combinations: Array, functionals: Array, rows: Index, fixed: Mask
+    motions: Columns,
+    combinations: Array,
+    functionals: Array,
+    rows: Index,
+    fixed: Mask,
+    row_share: float = 0.0,
 ) -> NullSpace:
     """Null space, by a basis `motions` (n, r) of size 1, with well separated pins.
 
     `combinations` (r, l) of the motions no row resists; `functionals` (l, n) determine these. The
     unknowns `rows` (m,) are the values of contact rows, those that are `fixed` (n,) are given.
-    Motions that move no other unknown of a body are pinned at values of rows.
+    Of motions that move other unknowns by less than a `row_share` of them, these are pins.
     """
     share = (~fixed).astype(float)
-    share[rows] *= ROW_PIN
+    share[rows] *= row_share
     places, every_place = np.flatnonzero(share == 1), np.flatnonzero(share)
     lineal = motions @ combinations
     lineal[rows] = 0.0
