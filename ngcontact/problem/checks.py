@@ -161,10 +161,12 @@ def check_numbers(view: MeshArrays) -> None:
             f"mesh, one with the vertices {corners}: what acts there would count twice; give every "
             "side one name"
         )
-    sides = 2 * view.mesh.nfacet - (view.dim + 1) * view.mesh.ne  # inner ones belong to two
-    if sides != (named := np.count_nonzero(~view.inner_facets)):
+    local = list(itertools.combinations(range(view.dim + 1), view.dim))
+    _, elements = np.unique(view.keys(view.elements[:, local]), return_counts=True)
+    outer = np.count_nonzero(elements == 1)
+    if outer != (named := np.count_nonzero(~view.inner_facets)):
         raise ValueError(
-            f"the boundaries of the mesh have {named} of its {sides} outer sides, and estimates "
+            f"the boundaries of the mesh have {named} of its {outer} outer sides, and estimates "
             "would not see the others: give all of these a name, and no others, as "
             "ngcontact.mesh.read does"
         )
