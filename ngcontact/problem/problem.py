@@ -23,11 +23,9 @@ from .values import (
     body_mask,
     boundary_mask,
     by_region,
-    described,
     displacement_components,
     numbers,
     region_pattern,
-    table,
     traction_data,
     vector_data,
 )
@@ -133,16 +131,6 @@ class Problem:
         """Summary in a few words, instead of all data."""
         pairs = ", ".join(pair.named() for pair in self.contact) or "none"
         return f"Problem({self.model}; bodies {', '.join(self.materials)}; contact {pairs})"
-
-    def _repr_html_(self) -> str:
-        """Table of the data for notebooks, a line each."""
-        rows = [("model", "", self.model)]
-        for what in ("materials", "displacement", "traction", "force", "strain"):
-            rows += [(what, name, described(data)) for name, data in getattr(self, what).items()]
-        if self.guide is not None:
-            rows.append(("sliding", self.guide, "no normal displacement, no shear"))
-        rows += [(f"contact {k}", "", described(pair)) for k, pair in enumerate(self.contact)]
-        return table(("", "where", "what"), rows)
 
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:
         """Return P of HH81 (3.7) on a key of `traction`, dim d; a pressure p becomes -p n.

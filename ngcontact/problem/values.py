@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from html import escape
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import Any, NoReturn, TypeAlias
 from weakref import WeakKeyDictionary
@@ -190,54 +188,16 @@ LONG_TEXT = 4000  # characters of what is printed; numbers are short
 KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 # Lines of what NGSolve prints of numbers, in vectors, times others and times the normal.
 _NUMBER = r"(?:[-+.\de]+|-?inf|nan)"
-_LEAF = re.compile(rf"\s*coef ({_NUMBER}), real")
 _VECTOR = r"unary operation ' '|VectorialCoefficientFunction|reshape"
 _DIM = r"(, dim=\d+|, dims = \d+ x \d+)?"
-_AROUND = re.compile(rf"\s*coef ({_VECTOR}), real{_DIM}")
 _TIMES = rf"(scale )?{_NUMBER}|scalar-vector multiply|normal vector"
 _OF_NUMBERS = re.compile(rf"\s*({_NUMBER}\*\()?(coef ({_VECTOR}|{_TIMES}), real{_DIM})?\s*\)?\s*")
-
-
-def _lines(value: ng.CoefficientFunction) -> list[str]:
-    """Lines that NGSolve prints of a function."""
-    text = str(value).replace("ZeroCF", "0")
-    if text.strip() == "ZeroCoefficientFunction":
-        return ["coef 0, real"] * int(value.dim)
-    return text.splitlines() if len(text) < LONG_TEXT else [text]
 
 
 def numbers(data: ng.CoefficientFunction) -> bool:
     """Whether data are made of numbers alone, perhaps times the normal. Looked at once."""
     if data not in KNOWN:  # printing a long expression costs as much as evaluating it
-        KNOWN[data] = all(map(_OF_NUMBERS.fullmatch, _lines(data)))
+        text = str(data).replace("ZeroCF", "0")
+        short = len(text) < LONG_TEXT and all(map(_OF_NUMBERS.fullmatch, text.splitlines()))
+        KNOWN[data] = short or text.strip() == "ZeroCoefficientFunction"
     return KNOWN[data]
-
-
-def described(value: Any) -> str:
-    """A value in a few characters: numbers, "free" for None, "function" for all that varies."""
-    if value is None:
-        return "free"
-    if isinstance(value, str | bool):
-        return str(value)
-    if is_dataclass(value):  # what is not as usual
-        given = ((f.name, getattr(value, f.name), f.default) for f in fields(value))
-        return ", ".join(f"{name} = {described(x)}" for name, x, usual in given if x is not usual)
-    if isinstance(value, tuple | np.ndarray):
-        return f"({', '.join(map(described, value))})"
-    if not isinstance(value, ng.CoefficientFunction):
-        return f"{value:.6g}" if isinstance(value, Real) else "function"
-    lines = _lines(value)
-    leaves = [leaf.group(1) for line in lines if (leaf := _LEAF.fullmatch(line))]
-    around = [line for line in lines if not _LEAF.fullmatch(line)]
-    if len(leaves) != value.dim or not all(map(_AROUND.fullmatch, around)):
-        return "function"
-    return leaves[0] if value.dim == 1 else f"({', '.join(leaves)})"
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """HTML of a table, for notebooks; all text is escaped."""
-    names = "".join(f"<th>{escape(name)}</th>" for name in head)
-    lines = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
-    )
-    return f"<table><thead><tr>{names}</tr></thead><tbody>{lines}</tbody></table>"

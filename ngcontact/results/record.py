@@ -32,15 +32,10 @@ def record_of(solution: Guaranteed) -> dict[str, Number]:
         "steps": len(solution.steps),
         "energy": float(solution.energy),
         "energy_norm": float(solution.energy_norm),
-        "error_estimate": float(solution.error_estimate) if estimated else math.nan,
-        "relative_error_estimate": (
-            float(solution.relative_error_estimate) if estimated else math.nan
-        ),
-        "error_bound": float(solution.error_bound) if solution.bounded else math.nan,
-        "relative_error_bound": (
-            float(solution.relative_error_bound) if solution.bounded else math.nan
-        ),
     }
+    for name, made in (("estimate", estimated), ("bound", solution.bounded)):
+        for error in (f"error_{name}", f"relative_error_{name}"):
+            row[error] = float(getattr(solution, error)) if made else math.nan
     for number, pair in enumerate(solution.pairs):
         force = (solution.contact_force(number) + 0.0).tolist()  # no -0.0
         row |= {f"contact_{number}_force_{axis}": x for axis, x in zip(AXES, force, strict=False)}
