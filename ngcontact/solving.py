@@ -180,11 +180,7 @@ def _check_start(problem: Problem, start: object) -> None:
 def solve_on(
     problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
 ) -> Solution:
-    """Solution on one mesh; names and values have been checked.
-
-    Roles of pairs that fail, or that leave a body all but free, are tried the other way round,
-    once; `Solution.problem` has the pairs as they were solved.
-    """
+    """Solution on one mesh; roles of pairs that fail are tried the other way round, once."""
     before = evaluations()
     mesh, curved = curve(mesh, order, element)
     if curved and mesh.GetCurveOrder() > 1:  # straight sides have no middles to place
@@ -450,11 +446,7 @@ def levels(
     contradictory: Sequence[Contradiction],
     start: Solution | None = None,
 ) -> Generator[Solution]:
-    """Levels from a first mesh on; names and values have been checked.
-
-    The mesh is curved as the element asks, and the first of the sequence of `start`, a solution
-    for another load; `contradictory` are the supports that contradict each other there.
-    """
+    """Levels from a first, curved mesh on, perhaps after a `start` for another load."""
     goal, guaranteed = refinement.tolerance or 0.0, refinement.guaranteed
     element, solution = refinement.element, None
     # Bound over estimate, by the last bound that was made.

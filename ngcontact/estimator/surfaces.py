@@ -89,19 +89,15 @@ def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Ar
     if trace.order != 2:
         return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
     edges = value[:, 3:]
-    opposite = (triangle.EDGES[None] == np.arange(3)[:, None, None]).any(axis=2)
+    beside = 3 - triangle.EDGES.sum(axis=1)  # the vertex that an edge has not
     # At a vertex the sum of its two edges less the third.
-    linear = np.where(opposite, 1.0, -1.0) @ edges.T
+    linear = (1.0 - 2.0 * np.eye(3)[:, beside]) @ edges.T
     has = pair.line.rows[:, :3] >= 0
     value[:, :3] = np.where(has, value[:, :3], linear.T)
     shapes = triangle.lagrange(2, s)
-    by_edges = (1 - 2 * s[:, OPPOSITE]) * edges[local]
+    by_edges = (1 - 2 * s[:, beside]) * edges[local]
     quadratic = np.einsum("ki,ij,kj->k", shapes, triangle.bernstein(2), value[local])
     return np.where(has[local].any(axis=1), quadratic, by_edges.sum(axis=1))
-
-
-# The vertex that no edge has, by edge.
-OPPOSITE = np.array([({0, 1, 2} - set(edge)).pop() for edge in triangle.EDGES.tolist()])
 
 
 def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:

@@ -36,6 +36,12 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float) -> None:
         axes.annotate(text, place, xytext=offset, ha=ha, va=va, **beside)
 
 
+def errors_of(levels: Sequence[Guaranteed], name: str) -> tuple[Array, Array]:
+    """Unknowns (k,) of levels, and their errors (k,) of a `name`."""
+    unknowns = [float(level.displacement.space.ndof) for level in levels]
+    return np.array(unknowns), np.array([getattr(level, name) for level in levels])
+
+
 def plot_convergence(
     runs: Mapping[str, Run] | Sequence[Guaranteed],
     path: str | os.PathLike[str] | None = None,
@@ -68,33 +74,24 @@ def plot_convergence(
     named = {str(k): run for k, run in runs.items()} if isinstance(runs, Mapping) else {"": runs}
     if unknown := set(rates or {}) - set(named):
         raise ValueError(f"rates: no run is called {', '.join(sorted(unknown))}")
-    curves = {}
-    for label, run in named.items():
-        if isinstance(run, tuple):
-            curves[label] = x, _ = np.asarray(run[0], float), np.asarray(run[1], float)
-        else:
-            x = np.array([float(level.displacement.space.ndof) for level in run])
-            curves[label] = x, np.array([level.relative_error_estimate for level in run])
-        if len(x) == 0:
-            raise ValueError(f'run "{label}" is empty')
     target = None if path is None else check_path(path, ".png")
     figure = new_figure(target, figsize=(6.5, 5))
     axes = figure.subplots()
     for k, (label, run) in enumerate(named.items()):
-        (x, y), rate, name = curves[label], (rates or {}).get(label), label
-        colour, mark = colour_and_mark(k)
+        levels = () if isinstance(run, tuple) else run
+        x, y = run if isinstance(run, tuple) else errors_of(levels, "relative_error_estimate")
+        if len(x) == 0:
+            raise ValueError(f'run "{label}" is empty')
+        rate, name, (colour, mark) = (rates or {}).get(label), label, colour_and_mark(k)
         style: dict[str, Any] = {"color": colour, "marker": mark, "ms": 4}
-        known = []
-        if not isinstance(run, tuple):
-            order = run[-1].order
+        if levels:
+            order = levels[-1].order
             name, rate = label or f"estimate, order {order}", order / 2 if rate is None else rate
-            known = [level for level in run if level.bounded]
         axes.plot(x, y, label=name, **style)
-        if known:
-            size = [float(level.displacement.space.ndof) for level in known]
-            bound = [level.relative_error_bound for level in known]
+        if known := [level for level in levels if level.bounded]:
+            bound = errors_of(known, "relative_error_bound")
             name = f"{label}, bound".lstrip(", ")
-            axes.plot(size, bound, ls="--", mfc="w", label=name, **style)
+            axes.plot(*bound, ls="--", mfc="w", label=name, **style)
         if rate is not None:
             slope_triangle(axes, x, y, rate)
     axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="relative error, energy norm")

@@ -62,10 +62,7 @@ def plot_solution(
     scale: float | None = None,
     **options: Any,
 ) -> Figure:
-    """Picture of the deformed bodies and the contact pressure; see `Solution.plot`.
-
-    `options` are those of `Style`. With a `path` nothing is shown on a screen. Returns the figure.
-    """
+    """Picture of the deformed bodies and the contact pressure; see `Solution.plot`."""
     style = Style(scale, **options)
     target = None if path is None else check_path(path, ".png")
     scene = picture(solution, style)
@@ -96,10 +93,8 @@ def show(figure: Figure, target: Path | None, **options: Any) -> None:
 
         pyplot.show()
         return
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
     with replacing(target) as (draft,):
-        FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150, **options)
+        figure.savefig(draft, format="png", dpi=150, **options)
 
 
 def write_film(
@@ -359,13 +354,10 @@ def _draw_windows(
     bodies: Axes, close: Sequence[Axes], windows: Sequence[Window], unit: float
 ) -> None:
     """Frames of the windows around zones in the whole picture; axes of the close-ups."""
-    from matplotlib.patches import Rectangle
-
     several = len(windows) > 1
     for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
         (x, y), (right, top) = (corner / unit for corner in window)
-        frame = Rectangle((x, y), right - x, top - y, fill=False, color="crimson", lw=1.2)
-        bodies.add_patch(frame)
+        bodies.indicate_inset((x, y, right - x, top - y), edgecolor="crimson", alpha=1, lw=1.2)
         name = f"zone {k + 1}" if several else "zone in contact"
         axes.set(xlim=(x, right), ylim=(y, top), title=name)
         axes.locator_params(nbins=3 if several else 5)

@@ -351,8 +351,6 @@ def moved_nodes(solution: Solved, nodes: Nodes, style: Style) -> tuple[Array, Ar
 def _chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
-    Of nodes at `place` (k, d), which `move` (k, d), of the bodies of numbers `body` (k,).
-
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
     to the nearest node of another body errs on the side of a smaller factor. Where nothing touches
     half of each gap stays.

@@ -76,10 +76,7 @@ def plot_solids(
     scale: float | None = None,
     **options: Any,
 ) -> Figure:
-    """Picture of solids, cut open, and of the pressure; see `Solution.plot`.
-
-    Arguments and errors as of `plot_solution`; solids are not mirrored.
-    """
+    """Picture of solids, cut open, and of the pressure; see `Solution.plot`."""
     style = Style(scale, **options)
     if style.mirror is not None:
         raise ValueError(f'mirror = "{style.mirror}": solids are not mirrored; leave it out')

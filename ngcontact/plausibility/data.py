@@ -32,10 +32,7 @@ class Contradiction:
 
 
 def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
-    """All of Gamma_u with itself, within a boundary of the plane, too, and with guides.
-
-    By component, at each vertex: the least and the largest of the prescribed values.
-    """
+    """All of Gamma_u with itself, within a boundary of the plane, too, and with guides."""
     found: list[Contradiction] = []
     seen = features_of(problem, mesh) if problem.dim == 2 else []
     supports = [one for one in seen if one.kind == "displacement"]

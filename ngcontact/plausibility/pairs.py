@@ -80,10 +80,8 @@ PEAK_ERROR = 0.02
 # Drawn gap over a given gap of the other sign, from which the two contradict each other.
 CONTRADICTED_SHARE = 0.5
 
-PairWarnings = dict[tuple[str, int], str]  # messages by kind of warning and number of the pair
 
-
-def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
+def pair_warnings(solution: Solved, *, last: bool) -> dict[tuple[str, int], str]:
     """Messages on implausible results, by the kind of warning and the number of the pair.
 
     On every mesh: fixed directions far from the normals, bodies that are drawn far apart, a given
@@ -94,7 +92,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
     trace, plane, program = space.trace, problem.dim == 2, solution.discrete.program
-    found: PairWarnings = {}
+    found: dict[tuple[str, int], str] = {}
     largest = [np.abs(state.force).max(initial=0.0) for state in pairs]
     noise = FORCE_ROUND_OFF * np.abs(program.diagonal * solution.minimiser.u).max(initial=0.0)
     if last and noise > LOST_SHARE * max(largest, default=noise) and (text := _lost(solution)):
@@ -277,11 +275,7 @@ class _Samples:
 
 
 def _samples_of_lines(trace: BoundaryTrace, state: ContactState) -> _Samples:
-    """Samples on segments of the plane where the gap may be negative between contact points.
-
-    These have an open point, and a least gap that is small compared with its change over the
-    segment and its neighbours.
-    """
+    """Samples on segments of the plane with an open point, of small gaps that change much."""
     line, gap, contact = state.line, np.maximum(state.gap, 0.0), state.line.contact
     whole = np.flatnonzero((line.rows >= 0).all(axis=1))
     rows, high = line.rows[whole], np.zeros(len(gap))

@@ -23,31 +23,29 @@ from .values import body_mask, boundary_mask, refuse_where
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
 Masks: TypeAlias = dict[str, Mask]
 
-# Where data are looked at in every element. Loads are integrated and may be singular at an end;
-# prescribed values and gaps are interpolated and must exist there.
-# By the dimension of the bodies.
+
+def _rule(*points: tuple[float, float, float]) -> ng.IntegrationRule:
+    return ng.IntegrationRule(list(points), [0.0] * len(points))  # weights are not read
+
+
+# Where data are looked at in every element, by the dimension of the bodies. Loads are integrated
+# and may be singular at an end; prescribed values and gaps are interpolated and must exist there.
 ELEMENT_RULES = {
-    2: ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3),
+    2: _rule((1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)),
     3: ng.IntegrationRule(ng.TET, 2),
 }
 # Middles of the sides of elements: stresses, which initial strains belong to, are compared there.
 SIDE_RULES = {
-    2: ng.IntegrationRule([(0.5, 0, 0), (0, 0.5, 0), (0.5, 0.5, 0)], [1 / 6] * 3),
-    3: ng.IntegrationRule(
-        [(0, 1 / 3, 1 / 3), (1 / 3, 0, 1 / 3), (1 / 3, 1 / 3, 0), (1 / 3,) * 3], [1 / 24] * 4
-    ),
+    2: _rule((0.5, 0, 0), (0, 0.5, 0), (0.5, 0.5, 0)),
+    3: _rule((0, 1 / 3, 1 / 3), (1 / 3, 0, 1 / 3), (1 / 3, 1 / 3, 0), (1 / 3, 1 / 3, 1 / 3)),
 }
 FACET_RULES = {2: ng.IntegrationRule(ng.SEGM, 3), 3: ng.IntegrationRule(ng.TRIG, 3)}
 END_RULES = {
-    2: ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
-    3: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 0), (1 / 3, 1 / 3, 0)], [1 / 8] * 4),
+    2: _rule((0, 0, 0), (0.5, 0, 0), (1, 0, 0)),
+    3: _rule((1, 0, 0), (0, 1, 0), (0, 0, 0), (1 / 3, 1 / 3, 0)),
 }
-# Vertices of simplices, in their order, by dimension.
-CORNERS = {
-    3: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)], [1 / 24] * 4),
-    2: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 0)], [1 / 6] * 3),
-    1: ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1 / 2] * 2),
-}
+# Vertices of segments and triangles, in their order, by dimension.
+CORNERS = {1: _rule((1, 0, 0), (0, 0, 0)), 2: _rule((1, 0, 0), (0, 1, 0), (0, 0, 0))}
 # What messages call the elements, others that are refused, and faces of bodies, by dimension.
 ELEMENTS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra, prisms or pyramids")}
 
@@ -278,12 +276,7 @@ def check_tractions(
 
 
 def check_overlaps(view: MeshArrays) -> None:
-    """Refuse bodies drawn on top of each other, and a face drawn over a part of itself.
-
-    An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
-    so much, places at equal steps of the smaller one's area are looked for in the larger one.
-    In space bodies are solids, and areas are volumes.
-    """
+    """Refuse bodies drawn on top of each other, and a face drawn over a part of itself."""
     piece = view.pieces[view.elements[:, 0]]
     parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
     if len(parts) == 1:

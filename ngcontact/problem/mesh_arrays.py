@@ -100,10 +100,8 @@ class MeshArrays:
     @property
     def diameters(self) -> Array:
         """Longest edge (ne,) of each element, lengths."""
-        corners, k = self.corners, np.arange(self.dim + 1)
-        edges = corners[:, k] - corners[:, k - 1]
-        if self.dim == 3:
-            edges = np.hstack([edges, corners[:, :2] - corners[:, 2:]])
+        one, other = np.triu_indices(self.dim + 1, 1)
+        edges = self.corners[:, one] - self.corners[:, other]
         return np.linalg.norm(edges, axis=2).max(axis=1)
 
     @property

@@ -70,37 +70,28 @@ class _Finder:
 
     def find(self, points: Array, at: Index) -> Location:
         """Elements of the points numbered `at` (j,) among `points` (k, d)."""
-        point, element = self._candidates(points[at])
-        point = at[point]
+        found: list[tuple[Index, Index]] = [(np.zeros(0, dtype=np.intp),) * 2]
+        for numbers, middles, radius in self.groups if len(at) else ():
+            near = KDTree(points[at]).sparse_distance_matrix(
+                middles, radius, output_type="coo_matrix"
+            )
+            found.append((at[near.row], numbers[near.col]))
+        point, element = (np.concatenate(part) for part in zip(*found, strict=True))
         reference = self._references(points[point], element)
         share = np.column_stack([reference, 1 - reference.sum(axis=1)])
-        tolerance = (
-            INSIDE_COORDINATE
-            + COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1) / self.size[element]
-        )
+        noise = COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1)
+        tolerance = INSIDE_COORDINATE + noise / self.size[element]
         outside = ~(share >= -tolerance[:, None])  # so a NaN is outside
         inside = ~outside.any(axis=1)
         key = point * len(self.mesh.GetMaterials()) + self.body[element]
         left = np.flatnonzero(~np.isin(key, key[inside]) & (outside.sum(axis=1) == 1))
         side = self.facet[element[left], outside[left].argmax(axis=1)]
         left, side = left[side >= 0], side[side >= 0]
-        x = points[point[left]]
-        tolerance = INSIDE_COORDINATE * self.trace.lengths(side) + COORDINATE_ROUND_OFF * np.abs(
-            x
-        ).max(axis=1)
-        beside = left[self.trace.beyond_cad(side, x) <= tolerance]
+        tolerance = INSIDE_COORDINATE * self.trace.lengths(side) + noise[left]
+        beside = left[self.trace.beyond_cad(side, points[point[left]]) <= tolerance]
         rows = np.concatenate([np.flatnonzero(inside), beside])
         rows = rows[np.argsort(point[rows], kind="stable")]
         return Location(point[rows], element[rows], reference[rows])
-
-    def _candidates(self, points: Array) -> tuple[Index, Index]:
-        """Points (q,) and elements (q,) near them, of `points` (j, d)."""
-        found: list[tuple[Index, Index]] = [(np.zeros(0, dtype=np.intp),) * 2]
-        for numbers, middles, radius in self.groups if len(points) else ():
-            pairs = KDTree(points).sparse_distance_matrix(middles, radius, output_type="coo_matrix")
-            found.append((pairs.row.astype(np.intp), numbers[pairs.col]))
-        point, element = (np.concatenate(part) for part in zip(*found, strict=True))
-        return point, element
 
     def _references(self, points: Array, element: Index) -> Array:
         """Places (q, d) of `points` (q, d) in the reference elements of elements (q,)."""

@@ -202,8 +202,8 @@ def test_corners_of_infinite_stress_are_named():
     without_proof(solution)
     q = solution.quantities()
     half = q["contact area"].value / 2
-    assert sorted(q["peak pressure"].infinite[:, 0]) == pytest.approx([-half, half])
-    assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
+    assert sorted(q["peak pressure"].singular.places[:, 0]) == pytest.approx([-half, half])
+    assert q["peak pressure"].singular.places[:, 1] == pytest.approx([0, 0])
     # The ends are corners of the punch: 0.5, to round-off of a sum of segments.
     assert abs(half - 0.5) <= q["contact area"].error + 1e-14
     words = "  0.1 away from where it is infinite: (-0.5, 0), (0.5, 0)"
@@ -372,6 +372,6 @@ def test_a_guide_that_ends_on_a_line_makes_the_pressure_infinite(start):
         traction={"upper_top": 0.01},
         contact=[Contact("upper_bottom", "lower_top")],
     )
-    places = solve(problem, maxh=0.5, order=2).quantities()["peak pressure"].infinite
+    places = solve(problem, maxh=0.5, order=2).quantities()["peak pressure"].singular.places
     expected = [(0, 0), (2, 0)] if start < 0 else [(2, 0)]
     np.testing.assert_allclose(places[np.argsort(places[:, 0])], expected, atol=1e-9)

@@ -182,11 +182,7 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
 
 
 def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
-    """Size of the force at points that supports hold, which no row has; of the element's size.
-
-    A line in contact that ends on Gamma_u has a force there that its supports cannot distinguish
-    from their own. Its share is that of the point's shape function, its pressure that beside.
-    """
+    """Size of the force at held points in contact, which no row has, and so of an error."""
     line = pair.line
     held = (line.rows < 0) & line.faces[:, None]
     beside = np.abs(line.on_segments(pair.pressure, 0.0)).max(axis=1)
@@ -235,11 +231,7 @@ def direction_of(solution: Solved, pair: int) -> tuple[Array, str]:
 
 
 def approach_of(solution: Solved, state: ContactState) -> tuple[Array, Array]:
-    """Vector (2,) by which the bodies of a pair approach, and sizes (2,) of its free part.
-
-    Each body moves by the mean of what its supports prescribe, or, where none does, by the
-    mean of its displacement; a rigid obstacle stays.
-    """
+    """Vector (2,) by which the bodies of a pair approach, and sizes (2,) of its free part."""
     trace = solution.discrete.space.trace
     bodies, total, free = connected_bodies(trace), np.zeros(2), np.zeros(2)
     for sign, body in _sides(state, bodies):

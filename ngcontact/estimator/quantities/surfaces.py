@@ -38,11 +38,7 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
 
 
 def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
-    """Pressures (k, order + 1) at the nodes of segments.
-
-    On segments that face the primary in part they are linear between the points with rows, times
-    the share that faces it: the resultant of each is that of its rows.
-    """
+    """Pressures (k, order + 1) at nodes; where segments face in part with the resultant of rows."""
     line, known = state.line, state.line.rows >= 0
     values = line.on_segments(state.pressure, 0.0)
     partly = np.flatnonzero(known.any(axis=1) & ~line.faces)
@@ -94,10 +90,7 @@ def _fitted(
 def _mean_traction(
     solution: Solved, trace: FacetTrace, state: ContactState, mean: Array
 ) -> ng.GridFunction:
-    """Mean of the tractions of both sides along the direction, where a facet has points in contact.
-
-    Of bodies on rigid obstacles the traction of the one; shifted to the `mean` (k,) of each facet.
-    """
+    """Mean traction of both sides along the direction, shifted to the `mean` (k,) of facets."""
     line, d = state.line, trace.order - 1
     boundary = solution.mesh.Boundaries(line.contact.secondary)
     facets = line.segments[state.touched]

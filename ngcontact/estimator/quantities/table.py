@@ -78,11 +78,6 @@ class Quantity:
     singular: Singular | None = None
 
     @property
-    def infinite(self) -> Array | None:
-        """Corners (k, 2) at which the true one is infinite."""
-        return None if self.singular is None else self.singular.places
-
-    @property
     def guaranteed(self) -> bool:
         """Whether `error` is proved."""
         return self.kind == "guaranteed"
