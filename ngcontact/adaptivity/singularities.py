@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, joined
+from ..arrays import Array, Mask, joined
 from ..contact import ContactState, ending_segments
 from ..errors import warn
 from ..fem import BoundaryTrace, boundary_corners, prescribed_components
@@ -110,17 +110,13 @@ def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
     return joined(found)
 
 
-def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
-    """Number (k,) of what is prescribed on each segment: one for equal conditions."""
+def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
+    """Vertices where one condition ends and another begins, and those that point inwards."""
     sides = [side for pair in problem.contact for side in pair.sides]
     masks = [trace.lies_on(slice(None), x) for x in (*problem.traction, problem.guide, *sides)]
     every = np.concatenate([prescribed_components(problem, trace), masks])
-    return np.unique(every, axis=1, return_inverse=True)[1].ravel()
-
-
-def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
-    """Vertices where one condition ends and another begins, and those that point inwards."""
-    found, kind = boundary_corners(trace), _conditions(problem, trace)
+    kind = np.unique(every, axis=1, return_inverse=True)[1].ravel()  # of equal conditions one
+    found = boundary_corners(trace)
     ends, changing = (np.diff(x[found.sides])[:, 0] != 0 for x in (trace.region, kind))
     inwards = ends & (found.angle > np.pi + BLUNT_ANGLE)  # where CAD edges end
     x = trace.arrays.vertices[found.vertex]

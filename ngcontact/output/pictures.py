@@ -311,9 +311,12 @@ def draw_scene(
     space = " " if width / height > 0.9 else "\n"
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
     _draw_windows(bodies, close, windows, style.unit("length")[1])
-    (label, kind, _), (_, unit) = scene.shown, style.unit(scene.shown.kind)
+    label, (_, unit) = (
+        style.title(scene.shown.label, scene.shown.kind),
+        style.unit(scene.shown.kind),
+    )
     extremes = float(scene.values.min()) / unit, float(scene.values.max()) / unit
-    colour_bar(figure, shading, [bodies, *close], style.title(label, kind), extremes)
+    colour_bar(figure, shading, [bodies, *close], label, extremes)
     if parts:
         _draw_pressures(pressures, scene.solution, style, parts)
     return pressures
@@ -330,14 +333,10 @@ def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
     moved = scene.moved / length
     triangles = Triangulation(moved[:, 0], moved[:, 1], scene.triangles)
     signed = limits[0] < 0 < limits[1]
-    shading = axes.tripcolor(
-        triangles,
-        scene.values / unit,
-        shading="gouraud",
-        vmin=limits[0] / unit,
-        vmax=limits[1] / unit,
-        cmap=DIVERGING if signed else SEQUENTIAL,
-    )
+    colours = DIVERGING if signed else SEQUENTIAL
+    low, high = (limit / unit for limit in limits)
+    drawing = {"shading": "gouraud", "cmap": colours, "vmin": low, "vmax": high}
+    shading = axes.tripcolor(triangles, scene.values / unit, **drawing)
     inner, outer = (list(moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
     if style.mesh:
         light = "0.35" if signed else "w"
@@ -354,10 +353,13 @@ def _draw_windows(
     bodies: Axes, close: Sequence[Axes], windows: Sequence[Window], unit: float
 ) -> None:
     """Frames of the windows around zones in the whole picture; axes of the close-ups."""
+    from matplotlib.patches import Rectangle
+
     several = len(windows) > 1
     for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
         (x, y), (right, top) = (corner / unit for corner in window)
-        bodies.indicate_inset((x, y, right - x, top - y), edgecolor="crimson", alpha=1, lw=1.2)
+        frame = Rectangle((x, y), right - x, top - y, fill=False, color="crimson", lw=1.2)
+        bodies.add_patch(frame)
         name = f"zone {k + 1}" if several else "zone in contact"
         axes.set(xlim=(x, right), ylim=(y, top), title=name)
         axes.locator_params(nbins=3 if several else 5)

@@ -102,7 +102,7 @@ class Style:
                 raise ValueError(
                     f"field: a function of {field.dim} components; give one real number"
                 )
-            return Field("field", "", lambda nodes: nodes.values(field)[:, 0])
+            return Field("field", "", field, lambda values: values[:, 0])
         choice = f"give a CoefficientFunction or one of {', '.join(known)}"
         if not isinstance(field, str):
             raise TypeError(f"field = {field!r}: {choice}")
@@ -116,7 +116,12 @@ class Field(NamedTuple):
 
     label: str
     kind: str
-    values: Callable[[Nodes], Array]  # (k,), at the nodes of a picture
+    read: ng.CoefficientFunction
+    of: Callable[[Array], Array]  # (k,), of nodal values (k, dim)
+
+    def values(self, nodes: Nodes) -> Array:
+        """Values (k,) at the nodes of a picture."""
+        return self.of(nodes.values(self.read))
 
 
 def coordinates(solution: Solved) -> tuple[str, ...]:
@@ -129,39 +134,28 @@ def fields(solution: Solved) -> dict[str, Field]:
     x, y, *z = coordinates(solution)
     normal = "zz" if x == "x" else "hoop"
     names = [f"{x}{x}", f"{y}{y}", f"{x}{y}", normal, "yz", "xz"][: 2 * solution.mesh.dim]
-    read = {"stress": full_stress(solution), "length": ng.CF(tuple(solution.displacement))}
-
-    def field(label: str, of: Callable[[Array], Array], kind: str = "stress") -> Field:
-        """Field of the components of `full_stress` (k, c), or of the displacement (k, d)."""
-
-        def values(nodes: Nodes) -> Array:
-            free = kind == "stress" and solution.stress_free  # round-off has no colours
-            return of(nodes.values(read[kind])) * (0.0 if free else 1.0)
-
-        return Field(label, kind, values)
+    free = 0.0 if solution.stress_free else 1.0  # round-off has no colours
+    stress, move = free * full_stress(solution), ng.CF(tuple(solution.displacement))
 
     def component(number: int) -> Callable[[Array], Array]:
         return lambda values: np.asarray(values[:, number])
 
-    found = {
-        "von_mises": field("von Mises stress", von_mises),
-        **{f"stress_{a}": field(f"stress {a}", component(k)) for k, a in enumerate(names)},
-        "largest_principal": field(
-            "largest principal stress", lambda s: principal_stresses(s)[:, 0]
-        ),
-        "smallest_principal": field(
-            "smallest principal stress", lambda s: principal_stresses(s)[:, 2]
-        ),
-        "mean_pressure": field(
-            "mean pressure, −tr σ/3", lambda s: -s[:, [0, 1, 3]].sum(axis=1) / 3
-        ),
-        "displacement": field(
-            "displacement, absolute value", lambda u: np.linalg.norm(u, axis=1), "length"
-        ),
+    stresses: dict[str, tuple[str, Callable[[Array], Array]]] = {
+        "von_mises": ("von Mises stress", von_mises),
+        **{f"stress_{a}": (f"stress {a}", component(k)) for k, a in enumerate(names)},
+        "largest_principal": ("largest principal stress", lambda s: principal_stresses(s)[:, 0]),
+        "smallest_principal": ("smallest principal stress", lambda s: principal_stresses(s)[:, 2]),
+        "mean_pressure": ("mean pressure, −tr σ/3", lambda s: -s[:, [0, 1, 3]].sum(axis=1) / 3),
     }
-    for k, a in enumerate((x, y, *z)):
-        found[f"displacement_{a}"] = field(f"displacement along {a}", component(k), "length")
-    return found
+    moves: dict[str, tuple[str, Callable[[Array], Array]]] = {
+        "displacement": ("displacement, absolute value", lambda u: np.linalg.norm(u, axis=1)),
+        **{
+            f"displacement_{a}": (f"displacement along {a}", component(k))
+            for k, a in enumerate((x, y, *z))
+        },
+    }
+    found = {name: Field(label, "stress", stress, of) for name, (label, of) in stresses.items()}
+    return found | {name: Field(label, "length", move, of) for name, (label, of) in moves.items()}
 
 
 class ContactPath(NamedTuple):

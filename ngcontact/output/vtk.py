@@ -193,9 +193,7 @@ def _contact(solution: Solved) -> pyvista.PolyData:
     points, m, solid = solution.points, len(solution.points), solution.mesh.dim == 3
     data = pyvista.PolyData()
     fields: dict[str, NDArray[Any]] = {
-        "pressure": solution.pressure,
-        "gap": solution.gap,
-        "force": solution.force,
+        **{name: getattr(solution, name) for name in ("pressure", "gap", "force")},
         "active": solution.active.astype(np.int32),
         "pair": solution.pair.astype(np.int32),
         "traction": -solution.pressure[:, None] * solution.direction,

@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, chords
-from ..contact import ContactState, Transitions, contact_line, faced_vertices, twins
+from ..contact import ContactState, contact_line, faced_vertices, twins
 from ..discrete import carried_active_set
 from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
@@ -196,21 +196,16 @@ def isolated(state: ContactState) -> Mask:
     return ~np.isin(state.transitions.inner, twins(state.line))
 
 
-def _half_length(line_ends: Transitions, run: Index, x: Array) -> float:
-    """Length of a `run` of points `x` (m, 2) from an end; half of it if another end follows."""
-    length = float(chords(x[run]).sum())
-    both = np.concatenate([line_ends.inner, line_ends.outer])
-    return length / 2 if np.count_nonzero(both == run[-1]) > (len(run) == 1) else length
-
-
 def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) -> GeometricMesh:
     """Coarse mesh with vertices at the ends of contact of a solution, in contact where that is."""
     places, sizes = [], []
     for state in pairs:
         ends, x = state.transitions, state.line.position
         for k in np.flatnonzero(isolated(state)):
-            runs = (run[k] for run in (ends.closed, ends.opened))
-            reach = [_half_length(ends, run, x) + float(ends.beyond[k]) for run in runs]
+            others, reach = np.concatenate([ends.inner, ends.outer]), []
+            for run in (ends.closed[k], ends.opened[k]):  # half of those that another end follows
+                halves = 1 + (np.count_nonzero(others == run[-1]) > (len(run) == 1))
+                reach.append(float(chords(x[run]).sum()) / halves + float(ends.beyond[k]))
             places.append(ends.position[k])
             sizes.append(END_SIZE * min(reach))
     fixed, least = np.array(places), np.array(sizes)

@@ -218,14 +218,6 @@ def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) ->
             raise ValueError(f'"{"|".join(common)}" is both in {a} and in {b}: {right}')
 
 
-def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
-    """Refuse bodies in none of the masks (r,) of materials."""
-    covered = np.logical_or.reduce(list(materials.values()))
-    for number, name in enumerate(mesh.GetMaterials()):
-        if not covered[number]:
-            raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
-
-
 def check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> None:
     """Refuse contact inside a body: on an interface, of a curve with itself, of a body with itself.
 

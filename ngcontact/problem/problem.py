@@ -184,7 +184,10 @@ class Problem:
             for j, pair in enumerate(self.contact)
         ]
 
-        checks.check_bodies(mesh, materials)
+        covered = np.logical_or.reduce(list(materials.values()))
+        for number, name in enumerate(mesh.GetMaterials()):
+            if not covered[number]:
+                raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
         prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
         full = {key: mask for (key, mask), parts in prescribed if None not in parts}
         others = displacement | traction | sliding

@@ -331,15 +331,10 @@ def quantities_of_solids(solution: Estimated, state: ContactState | None, pair: 
     levels = np.array([*(before[pair] for before in solution.earlier), values])
     known = len(levels) > EARLIER_LEVELS
     errors = np.abs(np.diff(levels, axis=0)).max(axis=0) if known else np.full(len(NAMES), np.nan)
+    places = {"peak pressure": place}
     rows = [
-        Quantity(
-            name,
-            float(value),
-            float(error),
-            "estimated" if known else "none",
-            place if name == "peak pressure" else None,
-        )
-        for name, value, error in zip(NAMES, values, errors, strict=True)
+        Quantity(name, float(x), float(bar), "estimated" if known else "none", places.get(name))
+        for name, x, bar in zip(NAMES, values, errors, strict=True)
     ]
     note = "errors: the larger of the last two differences between levels"
     if not known:
