@@ -414,9 +414,9 @@ def _first_plan(
     start: Solution | None,
 ) -> Plan:
     """The first level, of which nothing is forecast but by `start`."""
-    found, tree = unresolvable([]), RefinementTree(mesh, np.arange(mesh.ne))
-    if problem.dim == 2:
-        found = unresolvable([one.place for one in contradictory])
+    tree, plane = RefinementTree(mesh, np.arange(mesh.ne)), problem.dim == 2
+    found = unresolvable([one.place for one in contradictory if plane])
+    if plane:
         found = joined([corners(problem, boundary_trace(mesh, 1)), found])
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)
     if start is None or _is_exact(start):

@@ -33,8 +33,7 @@ def check_path(path: str | os.PathLike[str], suffix: str) -> Path:
     try:
         tempfile.TemporaryFile(dir=target.parent).close()
     except OSError as error:
-        folder = str(target.parent)
-        reason = f"{say}no file can be made in {folder!r} ({error.strerror}); choose another folder"
+        reason = f"{say}no file can be made in {str(target.parent)!r} ({error.strerror})"
         raise OSError(error.errno, reason) from error
     if target.is_dir():
         raise IsADirectoryError(f"{say}it is a folder; give the name of a file")

@@ -269,9 +269,8 @@ class Scene:
 
     def areas(self) -> Array:
         """Areas (t,) of the triangles."""
-        a, b, c = self.moved[self.triangles].transpose(1, 0, 2)
-        (ux, uy), (vx, vy) = (b - a).T, (c - a).T
-        return np.asarray(np.abs(ux * vy - uy * vx) / 2)
+        corners = self.moved[self.triangles]
+        return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
 
 
 def picture(solution: Solved, style: Style) -> Scene:

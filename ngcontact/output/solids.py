@@ -258,8 +258,7 @@ def _image(
             plotter.add_mesh(mesh, show_scalar_bar=False, **options)
     depth, far = meshes[0][0].points @ frame[2], 2 * meshes[0][0].length
     focus = np.array([*(low + high) / 2, depth.mean()]) @ frame
-    plotter.camera.focal_point, plotter.camera.position = focus, focus + far * frame[2]
-    plotter.camera.up = frame[1]
+    plotter.camera_position = [focus + far * frame[2], focus, frame[1]]
     plotter.camera.parallel_scale = float(high[1] - low[1]) / 2
     plotter.renderer.ResetCameraClippingRange()
     image = np.asarray(plotter.screenshot(return_img=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import ngsolve as ng
@@ -100,7 +101,7 @@ class MeshArrays:
     @property
     def diameters(self) -> Array:
         """Longest edge (ne,) of each element, lengths."""
-        one, other = np.triu_indices(self.dim + 1, 1)
+        one, other = map(list, zip(*combinations(range(self.dim + 1), 2), strict=True))
         edges = self.corners[:, one] - self.corners[:, other]
         return np.linalg.norm(edges, axis=2).max(axis=1)
 
