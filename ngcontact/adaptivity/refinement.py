@@ -110,7 +110,7 @@ def _move_to_partners(
         pairs = pairs[apart > VERTEX_DISTANCE * mesh.extent]
         normal = np.zeros((len(pairs), 2))
         for edge, at in _by_edge(trace, pairs[:, 0]):
-            normal[at] = edge.normal(xy[pairs[at, 0]])
+            normal[at] = edge.normal_at(edge.project(xy[pairs[at, 0]]))
         axis = across(normal)
         level = (xy[pairs[:, 0]] * axis).sum(axis=1)
         moving: tuple[int, ...] = (1,)

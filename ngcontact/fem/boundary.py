@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, across, for_components, from_triplets, rightward
 from ..lagrange import at, gauss, gauss_lobatto, lagrange, slope
-from ..mesh import CadEdge, cad_edges
+from ..mesh import CadEdge, CadFace, cad_edges
 from ..problem import POSITION, MeshArrays, Problem, boundary_mask
 from .model import PLANE, Model
 
@@ -205,17 +205,28 @@ class BoundaryTrace:
         """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
         return rightward(self.derivative(segment, s)) * self.side[segment, None]
 
-    def _by_edge(self, segment: Index) -> Iterator[tuple[CadEdge, Mask]]:
-        """CAD edges of segments (k,), each with a mask (k,) of its own; none without CAD."""
+    def _feet(
+        self, segment: Index, points: Array, s: Array
+    ) -> Iterator[tuple[CadEdge | CadFace, Index, Array, bool]]:
+        """CAD curves or faces of segments `segment` (k,), and feet on them; none without CAD.
+
+        With each the numbers (j,) of its segments, parameters (j, ...) of the feet of `points`
+        (k, d), near `s` (k,), and whether it is straight or plane: one parameter does then.
+        """
         regions, edges = self.region[segment], self.edges or []
         for region in set(regions.tolist()) if edges else ():
-            yield edges[region], regions == region
+            edge, here = edges[region], np.flatnonzero(regions == region)
+            t = np.array([edge.start]) if edge.straight else edge.project(points[here])
+            yield edge, here, t, edge.straight
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """Normals (k, 2) of the CAD edges, if any, at `s` (k,) of segments `segment` (k,)."""
+        """Normals (k, d) of the CAD curves or faces, at `s` (k,) of segments `segment` (k,).
+
+        Of the mesh without CAD.
+        """
         normals = self.normal(segment, s)
-        for edge, here in self._by_edge(segment):
-            exact = edge.normal(self.point(segment[here], s[here]))
+        for drawn, here, t, _ in self._feet(segment, self.point(segment, s), s):
+            exact = drawn.normal_at(t)
             outward = (exact * normals[here]).sum(axis=1) >= 0
             normals[here] = np.where(outward[:, None], exact, -exact)
         return normals
@@ -231,18 +242,18 @@ class BoundaryTrace:
         return self._guides[pattern]
 
     def beyond_cad(self, segment: Index, points: Array) -> Array:
-        """Distance (k,) of `points` (k, 2) beyond the CAD curves of segments `segment` (k,).
+        """Distance (k,) of `points` (k, d) beyond the CAD curves of segments `segment` (k,).
 
-        Negative within the body; infinite at straight curves and without CAD.
+        Negative within the body; infinite at straight curves, plane faces and without CAD.
         """
         beyond = np.full(len(points), np.inf)
-        outward = self.normal(segment, np.full(len(segment), 0.5))
-        for edge, here in self._by_edge(segment):
-            if not edge.straight:
-                x = points[here]
-                normal = edge.normal(x)
+        middle = self.vertices.mean(axis=0)[None].repeat(len(segment), axis=0)
+        outward = self.normal(segment, middle)
+        for drawn, here, t, straight in self._feet(segment, points, middle):
+            if not straight:
+                normal = drawn.normal_at(t)
                 normal *= np.sign((normal * outward[here]).sum(axis=1))[:, None]
-                beyond[here] = ((x - edge.point(edge.project(x))) * normal).sum(axis=1)
+                beyond[here] = ((points[here] - drawn.point(t)) * normal).sum(axis=1)
         return beyond
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:

@@ -9,6 +9,7 @@ are B c, of functions that are nowhere negative.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -19,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, from_triplets
-from ..mesh import beyond_faces, cad_faces, face_normals
+from ..mesh import CadEdge, CadFace, cad_faces, feet_on_faces
 from ..problem import POSITION, MeshArrays
 from ..reference import triangle
 from .boundary import CURVED_DISTANCE, BoundaryTrace, segment_trace
@@ -73,18 +74,10 @@ class FacetTrace(BoundaryTrace):
         vectors = self.area_vector(segment, s)
         return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
-    def exact_normal(self, segment: Index, s: Array) -> Array:
-        """Normals (k, 3) of CAD faces, if any, at `s` (k, 3) of facets `segment` (k,)."""
-        normals = self.normal(segment, s)
-        exact = face_normals(self.mesh, segment, s, self.point(segment, s))
-        if exact is None:
-            return normals
-        return exact * np.where((exact * normals).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-
-    def beyond_cad(self, segment: Index, points: Array) -> Array:
-        """Distance (k,) of `points` (k, 3) beyond the CAD faces of facets `segment` (k,)."""
-        middle = np.tile(triangle.CENTRE, (len(segment), 1))
-        return beyond_faces(self.mesh, segment, points, self.normal(segment, middle))
+    def _feet(
+        self, segment: Index, points: Array, s: Array
+    ) -> Iterator[tuple[CadEdge | CadFace, Index, Array, bool]]:
+        return feet_on_faces(self.mesh, segment, points, s)
 
     def same_nodes(self, other: BoundaryTrace) -> bool:
         """Whether the nodes are those of another trace, with the same unknowns."""

@@ -10,9 +10,9 @@ from .curving import keep_parents as keep_parents
 from .curving import resolved_lengths as resolved_lengths
 from .curving import unresolved as unresolved
 from .curving import vertex_parents as vertex_parents
-from .faces import beyond_faces as beyond_faces
+from .faces import CadFace as CadFace
 from .faces import cad_faces as cad_faces
-from .faces import face_normals as face_normals
+from .faces import feet_on_faces as feet_on_faces
 from .files import read as read
 from .generation import first_mesh as first_mesh
 from .generation import graded_mesh as graded_mesh

@@ -101,9 +101,8 @@ class CadEdge:
             t = np.where(other_miss < miss, other, t)
         return t
 
-    def normal(self, points: Array) -> Array:
-        """Unit normals (k, 2) at the projections of `points` (k, 2), right of the tangent."""
-        t = np.full(len(points), self.start) if self.straight else self.project(points)
+    def normal_at(self, t: Array) -> Array:
+        """Unit normals (k, 2) at the parameters `t` (k,), right of the tangent."""
         return rightward(self.derivative(t))
 
     def level(self, axis: Array, values: Array, near: Array) -> Array:

@@ -30,9 +30,13 @@ class CadFace:
     def __init__(self, face: TopoDS_Shape) -> None:
         self._surface = face.surf
         self.name = face.name or ""  # of the boundary
-        self._plane: dict[tuple[float, ...], Array] = {}
+        self._plane: dict[tuple[float, ...], bool] = {}
 
-    def at(self, uv: Array) -> tuple[Array, Array]:
+    def point(self, uv: Array) -> Array:
+        """Points (k, 3) at parameters `uv` (k, 2)."""
+        return self._at(uv)[0]
+
+    def _at(self, uv: Array) -> tuple[Array, Array]:
         """Points (k, 3) and both tangents (k, 3, 2) at parameters `uv` (k, 2)."""
         found = [self._surface.D1(float(u), float(v)) for u, v in uv]
         values = np.array([[(a.x, a.y, a.z) for a in one] for one in found]).reshape(-1, 3, 3)
@@ -43,23 +47,22 @@ class CadFace:
         normals = [list(self._surface.Normal(float(u), float(v))) for u, v in uv]
         return np.array(normals).reshape(-1, 3)
 
-    def plane(self, uv: Array) -> Array | None:
-        """Its unit normal (3,), if the part between parameters `uv` (k, 2) is plane, else None."""
+    def plane(self, uv: Array) -> bool:
+        """Whether the part between parameters `uv` (k, 2) is plane."""
         low, high = uv.min(axis=0), uv.max(axis=0)
         key = (*low, *high)
         if key not in self._plane:
             grid = np.stack(np.meshgrid(*np.linspace(low, high, SAMPLES).T), axis=-1)
             normals = self.normal_at(grid.reshape(-1, 2))
-            flat = np.abs(normals - normals[0]).max() <= NORMAL_DIFFERENCE
-            self._plane[key] = normals[0] if flat else np.zeros(0)
-        return self._plane[key] if self._plane[key].size else None
+            self._plane[key] = bool(np.abs(normals - normals[0]).max() <= NORMAL_DIFFERENCE)
+        return self._plane[key]
 
     def project(self, points: Array, uv: Array) -> Array:
         """Parameters (k, 2) of the feet of `points` (k, 3), by Newton's method from `uv` (k, 2)."""
         uv, size = uv.copy(), np.abs(points).max(initial=0.0)
         rest = np.arange(len(uv))
         for _ in range(NEWTON_STEPS):
-            x, t = self.at(uv[rest])
+            x, t = self._at(uv[rest])
             # At a pole one tangent vanishes: that parameter stays.
             step = (np.linalg.pinv(t, rcond=POLE_SINE) @ (points[rest] - x)[..., None])[..., 0]
             uv[rest] += step
@@ -87,11 +90,11 @@ def cad_faces(mesh: ng.Mesh) -> list[CadFace] | None:
     return faces
 
 
-def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Array, Array | None]]:
+def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Array, bool]]:
     """CAD faces that have some of the `facets` (n,); none without CAD.
 
     With each the positions (k,) of its facets in `facets`, parameters (k, 3, 2) of their corners,
-    and the unit normal (3,) if it is plane.
+    and whether it is plane.
     """
     faces, view = cad_faces(mesh) or [], MeshArrays(mesh)
     region, uv = view.boundaries, view.surface_parameters
@@ -104,7 +107,7 @@ def curved_facets(mesh: ng.Mesh) -> Mask:
     """Facets (k,) of curved CAD faces."""
     curved = np.zeros(mesh.GetNE(ng.BND), dtype=bool)
     for _, at, _, plane in _by_face(mesh, np.arange(len(curved))):
-        curved[at] = plane is None
+        curved[at] = not plane
     return curved
 
 
@@ -117,39 +120,22 @@ def unwrapped(uv: Array) -> Array:
     return np.where(np.abs(uv - uv[:, :1]) > np.pi, uv - 2 * np.pi * jump, uv)
 
 
-def face_normals(mesh: ng.Mesh, facets: Index, shapes: Array, points: Array) -> Array | None:
-    """Unit normals (k, 3) of the CAD faces at `points` (k, 3) of a mesh, None without CAD.
+def feet_on_faces(
+    mesh: ng.Mesh, facets: Index, points: Array, shapes: Array
+) -> Iterator[tuple[CadFace, Index, Array, bool]]:
+    """CAD faces that have some of the `facets` (n,), and feet on them; none without CAD.
 
-    The points lie on `facets` (k,), where the functions of degree 1 are `shapes` (k, 3).
+    With each the positions (k,) of its facets, parameters (k, 2) of the feet of their `points`
+    (n, 3), beside places where the functions of degree 1 are `shapes` (n, 3), and whether it is
+    plane: one pair of parameters does then.
     """
-    if cad_faces(mesh) is None:
-        return None
-    normals = np.zeros((len(facets), 3))
-    for face, at, uv, plane in _by_face(mesh, facets):
-        if plane is not None:
-            normals[at] = plane
-            continue
-        start = np.einsum("ki,kid->kd", shapes[at], unwrapped(uv))
-        # Facets share their nodes: each place once.
-        size = np.abs(points[at]).max(initial=0.0) or 1.0
-        rounded = np.round(points[at] / size, 13)
-        _, first, back = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-        feet = face.project(points[at[first]], start[first])
-        normals[at] = face.normal_at(feet)[back.ravel()]
-    return normals
-
-
-def beyond_faces(mesh: ng.Mesh, facets: Index, points: Array, outward: Array) -> Array:
-    """Distance (k,) of `points` (k, 3) beyond the CAD faces of `facets` (k,).
-
-    Negative within the body, where `outward` (k, 3) points away from it; infinite at plane faces
-    and without CAD.
-    """
-    beyond = np.full(len(points), np.inf)
-    for face, at, uv, plane in _by_face(mesh, facets):
-        if plane is None:
-            feet = face.project(points[at], unwrapped(uv).mean(axis=1))
-            normal = face.normal_at(feet)
-            normal *= np.sign((normal * outward[at]).sum(axis=1))[:, None]
-            beyond[at] = ((points[at] - face.at(feet)[0]) * normal).sum(axis=1)
-    return beyond
+    for face, at, corners, plane in _by_face(mesh, facets):
+        uv = corners[:1, 0]
+        if not plane:
+            # Facets share their nodes: each place once.
+            size = np.abs(points[at]).max(initial=0.0) or 1.0
+            rounded = np.round(points[at] / size, 13)
+            _, first, back = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+            start = np.einsum("ki,kid->kd", shapes[at[first]], unwrapped(corners[first]))
+            uv = face.project(points[at[first]], start)[back.ravel()]
+        yield face, at, uv, plane

@@ -202,7 +202,7 @@ def test_whole_circles_are_closed_curves(tmp_path):
     assert all(edge.closed for edge in edges.values())
     angle = np.linspace(0, 2 * math.pi, 100)
     circle = 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    normal = edges["rim"].normal(circle)
+    normal = edges["rim"].normal_at(edges["rim"].project(circle))
     assert np.abs(np.abs((normal * circle / 2).sum(axis=1)) - 1).max() < 1e-6
 
 
