@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import NEWTON_STEPS, Array, Index
-from ..reference.triangle import CENTRE, lagrange, lagrange_gradient
+from ..reference.triangle import CENTRE, DEGREES, lagrange, lagrange_gradient
 from .projection import (
     GRAZING_COSINE,
     MATCHING_DISTANCE,
@@ -21,7 +21,6 @@ from .projection import (
     opposes,
 )
 
-DEGREES = {3: 1, 6: 2, 10: 3}  # by the number of nodes
 NEAREST_FACETS = 8  # facets by their middles, at which a ray is tried before all others
 # Barycentric coordinate, negative, up to which a ray meets a facet: on planes of symmetry points
 # lie on the rim, and curved edges of both sides differ by round-off.

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, across, for_components, from_triplets, rightward
 from ..lagrange import at, gauss, gauss_lobatto, lagrange, slope
-from ..mesh import CadEdge, CadFace, cad_edges
+from ..mesh import CadEdge, CadFace, cad_edges, cad_faces
 from ..problem import POSITION, MeshArrays, Problem, boundary_mask
-from .model import PLANE, Model
+from .model import Model
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2
@@ -167,12 +167,68 @@ class BoundaryTrace:
     model: Model  # with the measure of segments
     axis: Index  # (k,), -1 or 1 where s = 0 or s = 1 alone lies on the axis of revolution, else 0
     on_axis: Mask  # (k,), segments that lie on it
+    bernstein: Mask  # (n,), nodes whose unknown is a Bernstein coefficient, of solids
     _guides: dict[str, tuple[Index, Array]] = field(default_factory=dict, init=False)
     _masks: dict[str, Mask] = field(default_factory=dict, init=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from the mesh: lines of a drawing cannot be pickled."""
-        return segment_trace, (self.mesh, self.order, self.model)
+        return type(self).of, (self.mesh, self.order, self.model, self.bernstein)
+
+    @classmethod
+    def of(
+        cls, mesh: ng.Mesh, order: int, model: Model, bernstein: Mask | None = None
+    ) -> BoundaryTrace:
+        """Trace of the displacements of degree `order` on the boundary of a mesh, in a model.
+
+        Unknowns at nodes `bernstein` (n,), none when left out, are Bernstein coefficients.
+        """
+        view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
+        nodes, degree, d = view.facets, max(1, mesh.GetCurveOrder()), view.dim
+        curve = corners = view.vertices[nodes]
+        if order > 1:
+            nodes = cls._numbered(nodes, np.array([el.dofs for el in space.Elements(ng.BND)]))
+        if degree > 1:
+            places = cls._reference(degree)
+            rule = ng.IntegrationRule(places, [1.0] * len(places))
+            curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))[:, :d]
+            curve = curve.reshape(len(nodes), len(places), d)
+        element, edges = view.facet_elements, cad_edges(mesh)
+        inwards = view.vertices[view.elements[element]].mean(axis=1) - corners[:, 0]
+        normal = rightward(*(corners[:, 1:] - corners[:, :1]).transpose(1, 0, 2))
+        axis = model.on_axis(curve.reshape(-1, d)).reshape(len(nodes), -1)
+        return cls(
+            mesh=mesh,
+            arrays=view,
+            space=space,
+            order=order,
+            geometry_order=degree,
+            region=view.boundaries,
+            nodes=nodes,
+            element=element,
+            body=view.bodies[element],
+            inner=view.inner_facets,
+            curve=curve,
+            side=np.where((inwards * normal).sum(axis=1) > 0, -1.0, 1.0),
+            edges=edges,
+            drawn=edges is not None or (d == 3 and cad_faces(mesh) is not None),
+            model=model,
+            axis=axis[:, -1].astype(np.intp) - axis[:, 0],
+            on_axis=np.asarray(axis.all(axis=1)),
+            bernstein=np.zeros(space.ndof, dtype=bool) if bernstein is None else bernstein,
+        )
+
+    @staticmethod
+    def _reference(degree: int) -> list[tuple[float, float, float]]:
+        """NGSolve's coordinates of the nodes of a degree."""
+        return [(1 - x, 0.0, 0.0) for x in gauss_lobatto(degree).tolist()]
+
+    @staticmethod
+    def _numbered(ends: Index, functions: Index) -> Index:
+        """Numbers (k, q) of nodes by vertices (k, d) and NGSolve's unknowns `functions` (k, q)."""
+        inner = functions[:, 2:]  # from the end with the lower number; after both ends
+        inner = np.where((ends[:, 0] < ends[:, 1])[:, None], inner, inner[:, ::-1])
+        return np.column_stack([ends[:, 0], inner, ends[:, 1]])
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 2) of the mesh's curves at parameters `s` (k,) of segments `segment` (k,)."""
@@ -317,10 +373,6 @@ class BoundaryTrace:
             values[places[axis == end]] = _edge_coefficients(order, end)
         return sp.csr_array((values, columns, starts), (size, size))
 
-    def same_nodes(self, other: BoundaryTrace) -> bool:
-        """Whether the nodes are those of another trace, with the same unknowns."""
-        return np.array_equal(self.nodes, other.nodes)
-
     def linear(self, segments: Index) -> sp.csr_array:
         """Functions of degree 1, (n, nv), by the nodes of `segments` (k,) and edge functions.
 
@@ -443,50 +495,6 @@ class BoundaryTrace:
     def _grouped(self, segment: Index) -> Index:
         """Keys (k,) by which those of `segment` (k,) at one node are looked at in order."""
         return np.arange(len(segment))
-
-
-def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
-    """Trace of the displacements of degree `order` on the boundary of a plane mesh, in a model."""
-    view = MeshArrays(mesh)
-    nodes = ends = view.facets
-    space = ng.H1(mesh, order=order)
-    if order > 1:
-        # From the end with the lower number, as NGSolve orients its edges; after both ends.
-        interior = np.array([el.dofs[2:] for el in space.Elements(ng.BND)])
-        interior = np.where((ends[:, 0] < ends[:, 1])[:, None], interior, interior[:, ::-1])
-        nodes = np.column_stack([ends[:, 0], interior, ends[:, 1]])
-
-    xy, degree = view.vertices, max(1, mesh.GetCurveOrder())
-    curve = xy[ends]
-    if degree > 1:
-        s = gauss_lobatto(degree)
-        rule = ng.IntegrationRule([(1 - x, 0, 0) for x in s], [1] * len(s))
-        curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))[:, :2]
-        curve = curve.reshape(-1, degree + 1, 2)
-
-    element, inner, edges = view.facet_elements, view.inner_facets, cad_edges(mesh)
-    opposite = xy[view.elements[element]].mean(axis=1) - xy[ends[:, 0]]
-    right = rightward(xy[ends[:, 1]] - xy[ends[:, 0]])
-    axis = model.on_axis(curve.reshape(-1, 2)).reshape(-1, degree + 1)
-    return BoundaryTrace(
-        mesh=mesh,
-        arrays=view,
-        space=space,
-        order=order,
-        geometry_order=degree,
-        region=view.boundaries,
-        nodes=nodes,
-        element=element,
-        body=view.bodies[element],
-        inner=inner,
-        curve=curve,
-        side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),
-        edges=edges,
-        drawn=edges is not None,
-        model=model,
-        axis=axis[:, -1].astype(np.intp) - axis[:, 0],
-        on_axis=np.asarray(axis.all(axis=1)),
-    )
 
 
 def prescribed_components(problem: Problem, trace: BoundaryTrace) -> Mask:

@@ -10,9 +10,9 @@ are B c, of functions that are nowhere negative.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import ngsolve as ng
 import numpy as np
@@ -20,10 +20,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, from_triplets
-from ..mesh import CadEdge, CadFace, cad_faces, feet_on_faces
-from ..problem import POSITION, MeshArrays
+from ..mesh import CadEdge, CadFace, feet_on_faces
 from ..reference import triangle
-from .boundary import CURVED_DISTANCE, BoundaryTrace, segment_trace
+from .boundary import CURVED_DISTANCE, BoundaryTrace
 from .model import PLANE, SOLID_MODEL, Model
 
 ENTRY_ROUND_OFF = 1e-13  # of changes of basis, whose entries are of size 1: round-off
@@ -40,10 +39,18 @@ class FacetTrace(BoundaryTrace):
 
     corners: ClassVar[list[int]] = [0, 1, 2]
     vertices: ClassVar[Array] = np.eye(3)  # (3, 3)
-    bernstein: Mask  # (n,), nodes whose unknown is a Bernstein coefficient
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return facet_trace, (self.mesh, self.order, self.bernstein)
+    @staticmethod
+    def _reference(degree: int) -> list[tuple[float, float, float]]:
+        return [(x, y, 0.0) for x, y, _ in triangle.nodes(degree).tolist()]
+
+    @staticmethod
+    def _numbered(ends: Index, functions: Index) -> Index:
+        nodes, order = functions.copy(), triangle.DEGREES[functions.shape[1]]
+        for (first, last), inner in zip(triangle.EDGES, triangle.edge_nodes(order), strict=True):
+            reversed_edges = np.flatnonzero(ends[:, first] > ends[:, last])[:, None]
+            nodes[reversed_edges, inner] = nodes[reversed_edges, inner[::-1]]
+        return nodes
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 3) of the mesh's surface at `s` (k, 3) of facets `segment` (k,)."""
@@ -78,11 +85,6 @@ class FacetTrace(BoundaryTrace):
         self, segment: Index, points: Array, s: Array
     ) -> Iterator[tuple[CadEdge | CadFace, Index, Array, bool]]:
         return feet_on_faces(self.mesh, segment, points, s)
-
-    def same_nodes(self, other: BoundaryTrace) -> bool:
-        """Whether the nodes are those of another trace, with the same unknowns."""
-        same = isinstance(other, FacetTrace) and np.array_equal(self.bernstein, other.bernstein)
-        return same and super().same_nodes(other)
 
     def places(self, segments: Index) -> Array:
         """Barycentric coordinates (k, q, 3) of the nodes of `segments` (k,)."""
@@ -199,57 +201,8 @@ class FacetTrace(BoundaryTrace):
         return values
 
 
-def facet_trace(mesh: ng.Mesh, order: int, bernstein: Mask | None = None) -> FacetTrace:
-    """Trace of the displacements of degree `order` on the boundary of a mesh of solids.
-
-    Unknowns at nodes `bernstein` (n,), none when left out, are Bernstein coefficients.
-    """
-    view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
-    vertices = view.facets
-    degree = max(1, mesh.GetCurveOrder())
-    points = [(x, y, 0.0) for x, y, _ in triangle.nodes(degree)]
-    rule = ng.IntegrationRule(points, [1.0] * len(points))
-    curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))
-    curve = curve.reshape(len(vertices), len(points), 3)
-    element = view.facet_elements
-    a, b, c = curve[:, :3].transpose(1, 0, 2)
-    inwards = view.corners[element].mean(axis=1) - (a + b + c) / 3
-    facing = (np.cross(b - a, c - a) * inwards).sum(axis=1)
-    zeros = np.zeros(len(vertices), dtype=np.intp)
-    trace = FacetTrace(
-        mesh=mesh,
-        arrays=view,
-        space=space,
-        order=order,
-        geometry_order=degree,
-        region=view.boundaries,
-        nodes=vertices,
-        element=element,
-        body=view.bodies[element],
-        inner=view.inner_facets,
-        curve=curve,
-        side=np.where(facing > 0, -1.0, 1.0),
-        edges=None,
-        drawn=cad_faces(mesh) is not None,
-        model=SOLID_MODEL,
-        axis=zeros,
-        on_axis=zeros > 0,
-        bernstein=np.zeros(space.ndof, dtype=bool) if bernstein is None else bernstein,
-    )
-    return trace if order == 1 else replace(trace, nodes=_nodes(trace, vertices))
-
-
-def _nodes(trace: FacetTrace, vertices: Index) -> Index:
-    """Numbers (k, q) of the nodes: those of NGSolve's unknowns, along edges from the lower end."""
-    nodes = trace._functions.copy()
-    for (first, last), inner in zip(triangle.EDGES, triangle.edge_nodes(trace.order), strict=True):
-        reversed_edges = np.flatnonzero(vertices[:, first] > vertices[:, last])[:, None]
-        nodes[reversed_edges, inner] = nodes[reversed_edges, inner[::-1]]
-    return nodes
-
-
 def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
     """Trace of the displacements of degree `order` on the boundary of `mesh`, in a model."""
     if mesh.dim == 3:
-        return facet_trace(mesh, order)
-    return segment_trace(mesh, order, model)
+        return FacetTrace.of(mesh, order, SOLID_MODEL)
+    return BoundaryTrace.of(mesh, order, model)

@@ -18,6 +18,7 @@ from ..lagrange import gauss_lobatto
 
 EDGES = np.array([[2, 0], [1, 2], [0, 1]])
 CENTRE = np.full((1, 3), 1 / 3)
+DEGREES = {3: 1, 6: 2, 10: 3}  # by the number of nodes
 
 
 @lru_cache

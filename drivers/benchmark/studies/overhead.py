@@ -120,7 +120,7 @@ STAGES = {  # cumulative seconds of these functions; none calls another
     "rows": [
         ("dual", "contact_line"),
         ("constraints", "change_of_basis"),
-        ("boundary", "segment_trace"),
+        ("boundary", "of"),
     ],
     "rigid motions": [("equilibrium", "equilibrium")],
     "matrix": [("sparse", "congruent")],
