@@ -9,13 +9,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial import legendre, polynomial
-from scipy.special import comb, roots_jacobi
+from numpy.polynomial import legendre
+from scipy.special import roots_jacobi
 
 from .arrays import Array, Index
 
-COEFFICIENT_ROUND_OFF = 1e-12  # of coefficients in Bernstein's basis, relative to values
-HALVINGS = 54  # of [-1, 1], to the last bit
+COEFFICIENT_ROUND_OFF = 1e-14  # of coefficients in Legendre's basis, relative to the largest
+END_ROUND_OFF = 1e-12  # of places beyond the ends
 
 
 @lru_cache
@@ -96,52 +96,18 @@ def _slopes(order: int) -> Array:
     return np.asarray(2 * legendre.legder(_coefficients(order)))
 
 
-@lru_cache
-def _to_bernstein(order: int) -> Array:
-    """Matrix (order + 1, order + 1) from values at Gauss-Lobatto points to Bernstein's basis."""
-    s, k = gauss_lobatto(order)[:, None], np.arange(order + 1)
-    return np.asarray(np.linalg.inv(comb(order, k) * s**k * (1 - s) ** (order - k)))
-
-
 def zeros(order: int, values: Array) -> tuple[Index, Array]:
-    """All places in [0, 1] where polynomials change their sign: numbers (r,), parameters (r,).
+    """All places in [0, 1] where polynomials vanish: numbers (r,), parameters (r,).
 
-    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points. Where
-    coefficients in Bernstein's basis have one sign there is none.
+    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points.
     """
-    coefficients = values @ _to_bernstein(order).T
-    bound = COEFFICIENT_ROUND_OFF * np.abs(values).max(axis=1, initial=0.0)
-    low, high = coefficients.min(axis=1), coefficients.max(axis=1)
-    some = np.flatnonzero((low <= bound) & (high >= -bound))
-    if not some.size:
-        return some, np.zeros(0)
-    number, s = _zeros(order, values[some])
-    return some[number], s
-
-
-def _zeros(order: int, values: Array) -> tuple[Index, Array]:
-    """The same of polynomials that may have some.
-
-    Between the zeros of its derivative a polynomial is monotone, so that halving finds them all,
-    from the linear derivative upwards.
-    """
-    powers = np.vander(2 * gauss_lobatto(order) - 1, increasing=True)
-    coefficients = np.linalg.solve(powers, values.T).T
-    ends = np.tile([-1.0, 1.0], (len(values), 1))
-    edges = ends
-    for degree in range(1, order + 1):
-        derivative = polynomial.polyder(coefficients, order - degree, axis=1).T[..., None]
-        low, high = edges[:, :-1], edges[:, 1:]
-        below = polynomial.polyval(low, derivative, tensor=False) < 0
-        changes = below != (polynomial.polyval(high, derivative, tensor=False) < 0)
-        for _ in range(HALVINGS if changes.any() else 0):
-            middle = (low + high) / 2
-            left = changes & (below == (polynomial.polyval(middle, derivative, tensor=False) < 0))
-            low, high = np.where(left, middle, low), np.where(left, high, middle)
-        edges = np.column_stack([ends[:, :1], np.where(changes, low, high), ends[:, 1:]])
-        edges = np.sort(edges, axis=1)
-    number, place = np.nonzero(changes)
-    return number, (1 + low[number, place]) / 2
+    number, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
+    for k, c in enumerate((_coefficients(order) @ values.T).T):
+        roots = legendre.legroots(legendre.legtrim(c, COEFFICIENT_ROUND_OFF * np.abs(c).max()))
+        s = (1 + roots[np.isreal(roots)].real) / 2
+        places.append(np.sort(np.clip(s, 0, 1)[np.abs(s - 0.5) <= 0.5 + END_ROUND_OFF]))
+        number.append(np.full(len(places[-1]), k))
+    return np.concatenate(number), np.concatenate(places)
 
 
 @lru_cache
