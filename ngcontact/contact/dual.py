@@ -45,7 +45,6 @@ from .facing import (
 from .line import ContactLine, without
 from .nodal import (
     jacobian,
-    no_point_faces,
     nodal_line,
     prescribed_gap,
     segment_weights,
@@ -322,7 +321,13 @@ def contact_line(
         line, facing = with_dual_rows(trace, line, facing, held)
     carries = facing & (line.weight > 0)
     if len(line.segments) and not carries.any():
-        raise ValueError(no_point_faces(contact))
+        xi = ", ".join(f"{x:.6g}" for x in contact.direction or ())
+        raise ValueError(
+            f'no point of the secondary "{contact.secondary}" faces the primary '
+            f'"{contact.primary}" along {f"direction=({xi})" if xi else "its outward normals"}: '
+            "choose boundaries that look at each other; the direction points from the secondary "
+            "body to the primary one"
+        )
     return without(line, np.flatnonzero(~carries))
 
 

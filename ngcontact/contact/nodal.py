@@ -29,24 +29,6 @@ SIDE_DIFFERENCE = 0.05  # relative difference of two sides from which their role
 BULGE_DIFFERENCE = 0.0125
 
 
-def no_point_faces(contact: Contact) -> str:
-    """Message for a pair of which no point faces."""
-    along = (
-        "along its outward normals: choose boundaries that look at each other, or give the "
-        "direction from the secondary body to the primary one"
-    )
-    if contact.direction is not None:
-        xi = ", ".join(f"{x:.6g}" for x in contact.direction)
-        along = (
-            f"along direction=({xi}): the direction points from the secondary body to the primary "
-            "one"
-        )
-    return (
-        f'no point of the secondary "{contact.secondary}" faces the primary '
-        f'"{contact.primary}" {along}'
-    )
-
-
 def prescribed_gap(
     contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
