@@ -80,7 +80,7 @@ def linear_systems(
     trace = space.trace
     if matrix is None:
         links = from_triplets(*basis.links, basis.T.shape)
-        factor = cholesky_of_closed_rows(space.form.mat, space.A, space.basis, basis.T, links)
+        factor = cholesky_of_closed_rows(space.form.mat, space.basis, basis.T, links)
     else:
         factor = cholesky(matrix)
     parents = vertex_parents(trace.mesh)
@@ -280,7 +280,7 @@ def discretise(
         program = _program(b, admissible, rigid, previous.program.K)
         systems = previous.systems
     else:
-        K, matrix = congruent(space.form.mat, space.A, T)
+        K, matrix = congruent(space.form.mat, T)
         program = _program(b, admissible, rigid, K)
         systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
@@ -335,7 +335,7 @@ def reassembled(
     the linear systems, `rigid` without its space.
     """
     basis, rigid = arrays["basis"], arrays["rigid"]
-    K, matrix = congruent(space.form.mat, space.A, space.basis @ basis.T)
+    K, matrix = congruent(space.form.mat, space.basis @ basis.T)
     again = QuadraticProgram(K=K, **program)
     systems = linear_systems(again, matrix, space, basis)
     kept = arrays | {"rigid": rigid and rigid.on(space)}

@@ -90,15 +90,14 @@ def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
     return _from_entries(row[lower], K.indices[lower], K.data[lower], K.shape)
 
 
-def congruent(
-    matrix: ng.BaseMatrix, A: sp.csr_array, T: sp.csr_array
-) -> tuple[sp.csr_array, ng.BaseMatrix | None]:
+def congruent(matrix: ng.BaseMatrix, T: sp.csr_array) -> tuple[sp.csr_array, ng.BaseMatrix | None]:
     """Matrix T'AT (k, k) of the unknowns y of u = T y, for SciPy and for NGSolve.
 
-    `A` (n, n) is `matrix` for SciPy. `T` (n, k) is the identity but for nodes on the boundary: of a
-    large matrix only the change is multiplied and handed over, a small part of the whole. Where it
-    is not, as where many bodies meet, NGSolve gets none: see `cholesky_of_closed_rows`.
+    A (n, n) is the `matrix`. `T` (n, k) is the identity but for nodes on the boundary: of a large
+    matrix only the change is multiplied and handed over, a small part of the whole. Where it is
+    not, as where many bodies meet, NGSolve gets none: see `cholesky_of_closed_rows`.
     """
+    A = shared(matrix)
     # element="physical" has fewer node values than edge unknowns
     if A.nnz <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
         right = handed_over(T)
@@ -107,14 +106,15 @@ def congruent(
     change = change_of_basis(A, T)
     if change.nnz > MAX_CHANGE * A.nnz:
         return A + change, None
-    total = _changed(matrix, A, change)
+    total = _changed(matrix, change)
     return shared(total), total
 
 
-def _changed(matrix: ng.BaseMatrix, A: sp.csr_array, change: sp.csr_array) -> ng.BaseMatrix:
-    """The sum of `matrix`, (n, n), which is `A` for SciPy, and a `change` (n, n), for NGSolve."""
+def _changed(matrix: ng.BaseMatrix, change: sp.csr_array) -> ng.BaseMatrix:
+    """The sum of a matrix and a `change` (n, n), for NGSolve."""
     if change.nnz == 0:
         return matrix
+    A = shared(matrix)
     places = _places(A, change)
     if places is None:
         return (matrix + handed_over(change)).CreateSparseMatrix()
@@ -188,24 +188,21 @@ def cholesky(matrix: ng.BaseMatrix) -> Factor:
 
 
 def cholesky_of_closed_rows(
-    matrix: ng.BaseMatrix,
-    A: sp.csr_array,
-    basis: sp.csr_array,
-    T: sp.csr_array,
-    links: sp.csr_array,
+    matrix: ng.BaseMatrix, basis: sp.csr_array, T: sp.csr_array, links: sp.csr_array
 ) -> Factor:
     """The same of T'(basis' A basis)T, in which contact rows that are open fill no entries.
 
-    `A` (n, n) is `matrix` for SciPy, `basis` (n, k) and `T` (k, k) lead from the unknowns y to its
-    own, and `links` (k, k) are what rows contain of other unknowns. With z = y less these at the
-    free unknowns, y = S z, the matrix of z is sparser.
+    A (n, n) is the `matrix`, `basis` (n, k) and `T` (k, k) lead from the unknowns y to its own, and
+    `links` (k, k) are what rows contain of other unknowns. With z = y less these at the free
+    unknowns, y = S z, the matrix of z is sparser.
     """
+    A = shared(matrix)
 
     def factor(free: Mask) -> Solve:
         S = sp.eye_array(len(free), format="csr") + sp.diags_array(free.astype(float)) @ links
         part = T @ S
         part.eliminate_zeros()  # what cancels
-        solve = cholesky(_changed(matrix, A, change_of_basis(A, basis @ part)))(free)
+        solve = cholesky(_changed(matrix, change_of_basis(A, basis @ part)))(free)
         return lambda b: np.asarray(S @ solve(S.T @ b))
 
     return factor

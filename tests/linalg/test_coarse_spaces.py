@@ -146,10 +146,10 @@ def test_congruent_matrices(changed, full, monkeypatch):
     A = for_ngsolve(given)
     T = np.eye(SIZE)
     T[rng.permutation(SIZE)[:changed]] += rng.normal(size=(changed, SIZE))
-    small, _ = congruent(A, shared(A), sp.csr_array(T))
+    small, _ = congruent(A, sp.csr_array(T))
     monkeypatch.setattr(sparse, "MULTIPLIED_ENTRIES", 0)
     monkeypatch.setattr(sparse, "MAX_CHANGE", np.inf)
-    K, total = congruent(A, shared(A), sp.csr_array(T))
+    K, total = congruent(A, sp.csr_array(T))
     expected = T.T @ shared(A).toarray() @ T
     # Sums of at most SIZE^2 terms: 1e-13 is round-off.
     for one in (K, small):
@@ -176,9 +176,9 @@ def test_factors_without_the_couplings_of_open_rows(monkeypatch):
     basis = sp.eye_array(SIZE, format="csr")
     monkeypatch.setattr(sparse, "MULTIPLIED_ENTRIES", 0)
     monkeypatch.setattr(sparse, "MAX_CHANGE", 0.0)
-    K, matrix = congruent(A, shared(A), T)
+    K, matrix = congruent(A, T)
     assert matrix is None
-    factor = cholesky_of_closed_rows(A, shared(A), basis, T, sp.csr_array(links))
+    factor = cholesky_of_closed_rows(A, basis, T, sp.csr_array(links))
     right = rng.normal(size=SIZE)
     for closed in (rows, rows[:3], rows[:0]):
         free = np.ones(SIZE, dtype=bool)

@@ -18,9 +18,7 @@ def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):
     """Matrix, multigrid and free unknowns, every second contact row active."""
     problem = discrete(REFINED[name], order, rounds, maxh)
     p = problem.program
-    K, matrix = congruent(
-        problem.space.form.mat, problem.space.A, problem.space.basis @ problem.basis.T
-    )
+    K, matrix = congruent(problem.space.form.mat, problem.space.basis @ problem.basis.T)
     free = ~p.fixed
     free[p.unknown[: len(p.unknown) // 2]] = False
     return K, truncated_multigrid(matrix, steps_of(problem, 0), free), free
@@ -79,7 +77,7 @@ class Scene:
         self.problem = discrete(REFINED[name], order, rounds, maxh)
         self.program = self.problem.program
         space = self.problem.space
-        _, self.matrix = congruent(space.form.mat, space.A, space.basis @ self.problem.basis.T)
+        _, self.matrix = congruent(space.form.mat, space.basis @ self.problem.basis.T)
         self.factor = cholesky(self.matrix)
         self.made = 0
 

@@ -154,7 +154,7 @@ def lifted(
         R = sp.bsr_array((V, node[:-1], node)).tocsr()
         R.eliminate_zeros()
         load = np.where(held.ravel(), 0.0, -(R.T @ (K @ w.ravel())))
-        y = cholesky(handed_over(congruent(matrix, K, R)[0]))(~held.ravel())(load)
+        y = cholesky(handed_over(congruent(matrix, R)[0]))(~held.ravel())(load)
         w += (R @ y).reshape(-1, 2)
     still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
     for (at, _, part), x in zip(stiffness, dofs, strict=True):
