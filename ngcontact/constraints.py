@@ -110,24 +110,13 @@ class Rows:
             return self
         return rows_of(self, rows)
 
-    def repeated(self) -> Index:
-        """Number (m,) of an earlier row with the same left side, or the row's own number.
-
-        Where two contact lines meet smoothly, both have a row at their common node.
-        """
-        number = np.arange(len(self.node))
-        order = np.argsort(self.node, kind="stable")
-        alike = self.node[order][1:] == self.node[order][:-1]
-        if not alike.any():
-            return number
-        e, n = self.entries, self.coupling.shape[1]
-        for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
-            difference = np.zeros((n, self.direction.shape[1]))
-            for row, sign in ((first, 1), (second, -1)):
-                difference[e.node[e.row == row]] += sign * e.coefficient[e.row == row]
-            if np.abs(difference).max() <= ROW_DIFFERENCE:
-                number[second] = number[first]
-        return number
+    def alike(self, first: int, second: int) -> bool:
+        """Whether two rows have the same left side."""
+        e = self.entries
+        difference = np.zeros((self.coupling.shape[1], self.direction.shape[1]))
+        for row, sign in ((first, 1), (second, -1)):
+            difference[e.node[e.row == row]] += sign * e.coefficient[e.row == row]
+        return bool(np.abs(difference).max() <= ROW_DIFFERENCE)
 
 
 def no_rows(n: int, d: int = 2) -> Rows:

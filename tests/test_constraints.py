@@ -71,11 +71,11 @@ def test_rows_joined_and_selected_are_the_same():
     assert no_rows(5).matrix.shape == (0, 10)
 
 
-def test_repeated_rows_have_the_number_of_the_first():
+def test_rows_with_one_left_side_are_alike():
     d = unit(0.7)
     alike = (1, d, {3: 0.5, 4: 0.5}), (1, d + 1e-12, {3: 0.5, 4: 0.5}), (1, d, {3: 0.4, 4: 0.6})
     contact = rows(5, (0, d, {3: 1.0}), *alike, (2, d, {4: 1.0}))
-    assert contact.repeated().tolist() == [0, 1, 1, 3, 4]
+    assert [contact.alike(1, k) for k in range(5)] == [False, True, True, False, False]
 
 
 def hosts(contact, given=None, stiffness=None):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -141,20 +140,21 @@ def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
 def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
     """Number (m,) of an earlier row of the same point, or the row's own; and rows to be averaged.
 
-    Rows are of one point if their left sides are the same, or if one of two at a node and along a
-    direction is a mean over segments: then both are, over the segments of different pairs.
+    Rows at a node and along a direction are of one point if their left sides are the same, as where
+    two contact lines meet smoothly, or if one is a mean over segments: then both are, over the
+    segments of different pairs.
     """
-    number = rows.repeated()
     means = np.concatenate([np.zeros(0, dtype=bool), *(line.means for line in lines)])
-    averaged = np.zeros(len(number), dtype=bool)
+    number, averaged = np.arange(len(means)), np.zeros(len(means), dtype=bool)
     x = np.round(rows.direction.T, 6)  # neighbours in this order, the first pair's row first
     order = np.lexsort((*x[::-1], rows.node))
-    for a, b in pairwise(order) if means.any() else ():
-        alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= DIRECTION_DIFFERENCE
-        apart = number[a] != number[b]
-        if rows.node[a] == rows.node[b] and apart and alike and (means[a] or means[b]):
+    turn = np.abs(np.diff(rows.direction[order], axis=0)).max(axis=1)
+    same = (np.diff(rows.node[order]) == 0) & (turn <= DIRECTION_DIFFERENCE)
+    for a, b in zip(order[:-1][same], order[1:][same], strict=True):
+        alike = rows.alike(a, b)
+        if alike or means[a] or means[b]:
             number[b] = number[a]
-            averaged[[a, b]] = True
+            averaged[[a, b]] |= not alike
     return number, averaged
 
 
