@@ -125,11 +125,6 @@ def no_rows(n: int, d: int = 2) -> Rows:
     return Rows(none, np.zeros((0, d)), sp.csr_array((0, n)), np.zeros(0), none > 0)
 
 
-def no_conditions(d: int = 2) -> Conditions:
-    """The conditions of a problem without supports."""
-    return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, d)), np.zeros(0))
-
-
 class Links(NamedTuple):
     """Coefficients of unknowns in contact rows, k of them."""
 

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from ngcontact.arrays import from_triplets, joined
-from ngcontact.constraints import (
-    STIFFNESS_CONTRAST,
-    Conditions,
-    Rows,
-    change_of_basis,
-    no_conditions,
-    no_rows,
-)
+from ngcontact.constraints import STIFFNESS_CONTRAST, Conditions, Rows, change_of_basis, no_rows
 from ngcontact.lagrange import lagrange
 
 X, Y = (1.0, 0.0), (0.0, 1.0)
@@ -26,7 +19,7 @@ def unit(angle):
 def conditions(*entries):
     """Conditions from (node, direction, value)."""
     if not entries:
-        return no_conditions()
+        return Conditions(np.zeros(0, dtype=int), np.zeros((0, 2)), np.zeros(0))
     node, direction, value = zip(*entries, strict=True)
     return Conditions(np.array(node), np.array(direction, dtype=float), np.array(value, float))
 

@@ -43,13 +43,7 @@ from .facing import (
     rays,
 )
 from .line import ContactLine, without
-from .nodal import (
-    jacobian,
-    nodal_line,
-    prescribed_gap,
-    segment_weights,
-    with_roles,
-)
+from .nodal import jacobian, nodal_line, prescribed_gap, segment_weights, with_roles
 from .projection import MATCHING_DISTANCE
 
 MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which hats take its place

@@ -8,14 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, Index, Mask, from_triplets, joined, rows_of
-from ..constraints import (
-    BasisTransformation,
-    Conditions,
-    Rows,
-    change_of_basis,
-    no_conditions,
-    no_rows,
-)
+from ..constraints import BasisTransformation, Conditions, Rows, change_of_basis, no_rows
 from ..contact import ContactLine, by_line, without
 from ..fem import BoundaryTrace, Space
 from ..problem import Problem, boundary_mask
@@ -42,12 +35,9 @@ def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
     return Conditions(node=nodes, direction=np.eye(d)[axes], value=value[axes, nodes])
 
 
-def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
+def _guided(guide: str, trace: BoundaryTrace) -> Conditions:
     """Gamma_0, (3.8): zero normal displacement at the nodes, with the exact normals."""
-    if problem.guide is None:
-        return no_conditions(trace.model.dim)
-    node = trace.nodes[trace.segments(problem.guide)].ravel()
-    number, normal = trace.guide(problem.guide)
+    node, (number, normal) = trace.nodes[trace.segments(guide)].ravel(), trace.guide(guide)
     _, first = np.unique(number, return_index=True)
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
 
@@ -62,7 +52,8 @@ def _on_axis(trace: BoundaryTrace) -> Conditions:
 
 def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_u and Gamma_0, to which the axis of a body of revolution belongs."""
-    return joined([_prescribed(problem, trace), _guided(problem, trace), _on_axis(trace)])
+    guided = [] if problem.guide is None else [_guided(problem.guide, trace)]
+    return joined([_prescribed(problem, trace), *guided, _on_axis(trace)])
 
 
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:

@@ -31,14 +31,7 @@ from ..linalg import (
 )
 from ..mesh import vertex_parents
 from ..problem import Problem, varies
-from ..qp import (
-    BorderedSystems,
-    Iterate,
-    QuadraticProgram,
-    SingularError,
-    minimise,
-    no_null_space,
-)
+from ..qp import BorderedSystems, Iterate, QuadraticProgram, SingularError, minimise, no_null_space
 from .admissible_set import (
     AdmissibleSet,
     admissible_set,

@@ -14,15 +14,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
-from ..problem import (
-    Elastic,
-    Hooke,
-    MeshArrays,
-    Problem,
-    body_mask,
-    strain_components,
-    varies,
-)
+from ..problem import Elastic, Hooke, MeshArrays, Problem, body_mask, strain_components, varies
 from ..quadrature import composite, loads_of
 from .boundary import ORDERS, Bodies, BoundaryTrace, node_basis, vector_space
 from .model import MODELS, SOLID_MODEL, Model
