@@ -235,10 +235,7 @@ def _supported(nodes: Index, c: Conditions) -> _Supported:
 
 
 def _preferred(rows: Rows, nodes: Index, stiffness: Array | None) -> Index:
-    """Node (m,) of the secondary, or the nearest one that faces it where that is much softer.
-
-    By its place among the `nodes` (n,).
-    """
+    """Places (m,) among `nodes` (n,): the secondary's, or a much softer one that faces it."""
     if rows.coupling.nnz == 0 or stiffness is None:
         return np.searchsorted(nodes, rows.node)
     coupling = rows.coupling.tocoo()
@@ -319,10 +316,7 @@ def _without_links(C: sp.csr_array, right: sp.csr_array, most: float) -> sp.csr_
 
 
 def _in_frames(rows: Rows, supported: _Supported) -> tuple[Entries, Entries]:
-    """Entries of `rows` in the frames of the n nodes, and what supports leave free of them.
-
-    They count by these nodes.
-    """
+    """Entries of `rows` in the frames, by their numbers, and what supports leave free of them."""
     e, fixed, frame = rows.entries, supported.fixed, supported.frames.columns
     node = np.searchsorted(supported.nodes, e.node)
     e = Entries(e.row, node, np.einsum("ki,kij->kj", e.coefficient, frame[node]))

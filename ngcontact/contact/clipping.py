@@ -75,10 +75,7 @@ def _near(corners: Array, direction: Array, facing: Array, reach: Array) -> tupl
 
 
 def _from_apex(polygon: Array, count: Index) -> tuple[Array, Index]:
-    """Corners (r, 7, 3) of which `count` (r,) count, from the apex on.
-
-    The first one of `clipped` depends on round-off, and so would quadrature of kinks.
-    """
+    """Corners (r, 7, 3), of which `count` (r,) count, from the apex on: not by round-off."""
     number = np.arange(MOST_CORNERS)
     along = np.where(number < count[:, None], polygon @ APEX_DIRECTION, -np.inf)
     turned = (along.argmax(axis=1)[:, None] + number) % np.maximum(count, 1)[:, None]

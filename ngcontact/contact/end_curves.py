@@ -92,10 +92,7 @@ def _filled(values: Array) -> Array:
 
 
 def _slope(trace: FacetTrace, segments: Index, name: Index, opened: Array, closed: Array) -> float:
-    """Median slope of `opened` (k, q) in open parts of facets beside those in which contact ends.
-
-    `closed` (k, q) vanishes where contact is open. 0 where there are no such parts.
-    """
+    """Median slope of `opened` (k, q) beside ends of contact, where `closed` (k, q) is 0."""
     parts = triangle.parts(trace.order)
     x = trace.point(*trace.at_nodes(segments)).reshape(*name.shape, 3)
     open_part = (closed[:, parts] == 0).all(axis=2)

@@ -58,10 +58,7 @@ def opposes(normals: Array, directions: Array) -> Mask:
 
 
 def _bend(curve: Array) -> tuple[Array, Array]:
-    """Bounds (q,) of how far segments leave the uniform motion along their chords, lengths.
-
-    And of how far their velocities leave that of this motion.
-    """
+    """Bounds (q,) of how far segments, and their velocities, leave motion along the chords."""
     degree = curve.shape[1] - 1
     nodes = gauss_lobatto(degree)
     apart = curve - np.einsum("ji,qid->qjd", lagrange(1, nodes), curve[:, [0, -1]])

@@ -145,10 +145,7 @@ def _facing(
 
 
 def _gaps(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> tuple[Array, Index]:
-    """Gaps (k,) along normals at `s` (k,) of segments (k,), inf without, and the segments (k,) met.
-
-    Of the segments `other` (q,) of another body.
-    """
+    """Gaps (k,) along normals to segments `other` (q,), inf without, and the segments (k,) met."""
     normal = trace.exact_normal(segment, s)
     met = partners(trace, other, segment, trace.point(segment, s), normal, nodes=False)
     met.distance[met.segment < 0] = np.inf  # also of what lies beyond the own body

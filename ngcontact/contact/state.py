@@ -36,10 +36,7 @@ def _run_of_points(
 
 
 def _closing_point(distance: Array, gap: Array, order: int) -> float | None:
-    """Distance at which the gap closes, by a fit of gap^(2/3) over the open points, or None.
-
-    `distance` (k,) grows away from the contact, whose last point has distance 0.
-    """
+    """Where gap^(2/3), fitted to open points at `distance` (k,) from contact, is 0, or None."""
     chosen = slice(SKIPPED_POINTS, SKIPPED_POINTS + max(FIT_POINTS, 3 * order + 2))
     x, y = distance[chosen], np.maximum(gap[chosen], 0.0) ** (2 / 3)
     if len(x) < 2 or y[-1] <= 0:

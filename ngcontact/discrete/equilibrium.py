@@ -196,10 +196,7 @@ def free_motions(
 
 
 def _by_body(own: Array, body: Index, combinations: Array) -> Columns:
-    """Combinations (n, r) of what each `body` (n,) has of its `own` m motions (n, m).
-
-    Sparse where several bodies move, as their number would count twice.
-    """
+    """Combinations (n, r) of the `own` motions (n, m) of each `body` (n,); sparse of several."""
     n, m = own.shape
     of_bodies = combinations.reshape(-1, m, combinations.shape[1])
     moving = np.flatnonzero(of_bodies.any(axis=(1, 2)))
@@ -216,10 +213,7 @@ def _largest(columns: Columns) -> Array:
 
 
 def _node_values(space: Space, bodies: Bodies, body: Index) -> Array:
-    """Translations and rotations, (d * n, m), of the `body` (n,) of each node, as its values.
-
-    Translations are 1, rotations 1 at half the body's size.
-    """
+    """Translations by 1 and turns, by 1 at half the size, (d * n, m), of each node's `body`."""
     trace, d = space.trace, space.trace.model.dim
     n = space.basis.shape[1] // d
     place, one = np.zeros((n, d)), np.zeros(n)
@@ -342,10 +336,7 @@ def equilibrium(
 def _placing(
     rows: Array, unresisted: Array, work: Array, g: Array, equality: Mask
 ) -> tuple[Array, Mask]:
-    """Amounts (r,) of motions by which the load presses rigid bodies, and rows (m,) that carry it.
-
-    No movement without load, and where bodies must deform to fit at all.
-    """
+    """Amounts (r,) by which the load moves rigid bodies into contact, and rows (m,) in force."""
     no_motion = np.zeros(len(work)), np.zeros(len(g), dtype=bool)
     scale, force = np.abs(g).max(initial=0.0), np.abs(work).max(initial=0.0)
     if scale == 0.0 or force == 0.0:
@@ -368,10 +359,7 @@ def _placing(
 
 
 def _unbalanced(rows: Array, equality: Mask, work: Array) -> tuple[Array, Array]:
-    """Work (r,) of a load that contact forces cannot balance, and these forces (m,).
-
-    They are not negative but on equalities.
-    """
+    """Work (r,) that contact forces (m,), positive or of equalities, cannot balance, and these."""
     scale = np.abs(work).max(initial=0.0)
     G = np.vstack([rows, -rows[equality]]).T
     if scale == 0.0 or G.shape[1] == 0:
@@ -388,10 +376,7 @@ def _motion_of(left: Array) -> Array:
 
 
 def _is_within(left: Array, forces: Array, error: Array, beside: float = 0.0) -> bool:
-    """Whether errors (r,) of the work, round-off and work `beside` may have left it unbalanced.
-
-    Round-off of the `forces` (m,) gives work on bodies that carry no load, too.
-    """
+    """Whether errors (r,), round-off of `forces` (m,) and work `beside` explain work `left`."""
     motion, round_off = _motion_of(left), FORCE_ROUND_OFF * np.abs(forces).sum()
     return bool(motion @ left <= np.abs(motion) @ error + round_off + beside)
 
@@ -421,10 +406,7 @@ def _concentrated(
 def _check_work(
     problem: Problem, free: FreeMotions, rows: Array, equality: Mask, work: Array, noise: Array
 ) -> None:
-    """Raise unless quadrature, round-off or the mesh's shape made the unbalanced `work` (r,).
-
-    Loads that are not numbers are integrated again, with a measured error.
-    """
+    """Raise unless quadrature, round-off or the mesh's shape made the unbalanced `work` (r,)."""
     measured = _measured_work(problem, free)
     if measured is not None:
         work, noise = measured[0], noise + QUADRATURE_ERRORS * measured[1]
@@ -447,10 +429,7 @@ def _check_work(
 
 
 def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] | None:
-    """Work (r,) of the load on the free motions, by the mesh, and the error (r,) measured of it.
-
-    None where all loads are numbers: those of V_h are exact.
-    """
+    """Work (r,) of the load on the motions, and its measured error (r,); None of numbers."""
     trace, bodies = free.space.trace, free.bodies
     loads, measured = loads_of(problem, trace.mesh), _adaptively if problem.dim == 2 else _by_rules
     if all(numbers(load.data) for load in loads):

@@ -48,10 +48,7 @@ def edge_bubbles(order: int, axis: int = 0) -> Array:
 
 @lru_cache
 def _edge_coefficients(order: int, axis: int) -> Array:
-    """Coefficients (order - 1, order + 1) of NGSolve's edge functions by values at all nodes.
-
-    Those of the interior nodes, less the linear part.
-    """
+    """Coefficients (order - 1, order + 1) of NGSolve's edge functions by values at all nodes."""
     s = gauss_lobatto(order, axis)[1:-1]
     values = np.column_stack([s - 1, np.eye(order - 1), -s])
     return np.asarray(np.linalg.inv(edge_bubbles(order, axis)) @ values)

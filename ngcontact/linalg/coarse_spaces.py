@@ -66,11 +66,7 @@ def _depths(parents: Integers) -> Integers:
 
 
 def _vertex_steps(parents: Integers, most: int) -> list[tuple[sp.csr_array, Integers]]:
-    """Interpolation (n, k) of vertex values and the vertices that stay, until `most` do.
-
-    A step takes as many generations away as halve the vertices: work falls geometrically also
-    where refinement is local.
-    """
+    """Interpolations (n, k) of vertex values and the vertices that stay, half at most."""
     steps: list[tuple[sp.csr_array, Integers]] = []
     depth = _depths(parents)
     counts = np.bincount(depth).cumsum()

@@ -134,12 +134,9 @@ def _entries(K: sp.csr_array, rows: Index) -> tuple[Index, Index]:
 
 
 def _places(A: sp.csr_array, change: sp.csr_array) -> Index | None:
-    """Numbers (k,) of the entries of `A` at those of its `change`, both (n, n).
-
-    None where `A` has no entry for one of them, as between two bodies: some rows tell most often.
-    """
+    """Numbers (k,) of the entries of `A` at those of its `change`; None where `A` lacks one."""
     rows = np.diff(change.indptr).nonzero()[0]
-    for some in (rows[:: len(rows) // 16 + 1], rows):
+    for some in (rows[:: len(rows) // 16 + 1], rows):  # some tell most often
         entries, there = _entries(A, some)
         _, wanted = _entries(change, some)
         found = np.minimum(np.searchsorted(there, wanted), len(there) - 1)

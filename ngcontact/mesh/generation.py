@@ -231,10 +231,7 @@ def opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[
 
 
 def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> Mask:
-    """Whether another point of `edges` lies between `x` (k, 2) and the points `y` they see.
-
-    On a far side of the own body, as behind the middle of a disc.
-    """
+    """Whether one of `edges` lies between `x` (k, 2) and the `y` they see, as a far side may."""
     behind = np.zeros(len(x), dtype=bool)
     if contact.direction is None:
         return behind

@@ -209,11 +209,8 @@ def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
 
 
 def _extremes(extreme: np.ufunc, values: Array, window: int) -> Array:
-    """Extremes (c, n - window + 1) of `values` (c, n) in all windows, of 2^k - 1 samples each.
-
-    By those in windows of half the size: SciPy's filters take six times as long.
-    """
-    found, half = values, 1
+    """Extremes (c, n - window + 1) of `values` (c, n) in all windows, of 2^k - 1 samples each."""
+    found, half = values, 1  # by those of half the size: SciPy's filters take six times as long
     while half < window:
         sides = extreme(found[:, : -half - 1], found[:, half + 1 :])
         found, half = extreme(sides, values[:, half:-half]), 2 * half + 1
@@ -297,10 +294,7 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
 
 
 def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[float, float]:
-    """Length along a line to the middle of a feature, and its width.
-
-    From `first` to before `last` the samples (n,) depart from what is around them.
-    """
+    """Length along a line to the middle of a feature, `first` to `last` sample, and its width."""
     t = line.t
     low = t[first - 1] if first else 0.0
     high = t[last] if last < len(t) else line.ends[-1]
@@ -420,10 +414,7 @@ def _inside(
 def _widths(
     kind: str, function: Function, view: SampledElements, places: Array, spacing: float
 ) -> Array:
-    """Widths (k,) of features at `places` (k, 2): the least chord at the nearest of some of them.
-
-    Or at a wider place within whose width that lies.
-    """
+    """Widths (k,) of features at `places` (k, 2): the least chord at the nearest of some."""
     if not len(places):
         return np.empty(0)
     some = places[np.linspace(0, len(places) - 1, min(len(places), MEASURED_FEATURES)).astype(int)]
