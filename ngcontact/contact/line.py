@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -109,7 +110,8 @@ Values = TypeVar("Values", Array, Mask)
 
 def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
     """Parts (m_i,) of `values` (m,) over the points of all lines in order, one for each line."""
-    return np.split(values, np.cumsum([len(line.node) for line in lines], dtype=int))[:-1]
+    stops = list(accumulate((len(line.node) for line in lines), initial=0))
+    return [values[first:last] for first, last in pairwise(stops)]
 
 
 def links(line: ContactLine) -> Index:

@@ -260,15 +260,16 @@ class BoundaryTrace:
 
     def _feet(
         self, segment: Index, points: Array, s: Array
-    ) -> Iterator[tuple[CadEdge | CadFace, Index, Array, bool]]:
+    ) -> Iterator[tuple[CadEdge | CadFace, Index | Mask, Array, bool]]:
         """CAD curves or faces of segments `segment` (k,), and feet on them; none without CAD.
 
-        With each the numbers (j,) of its segments, parameters (j, ...) of the feet of `points`
-        (k, d), near `s` (k,), and whether it is straight or plane: one parameter does then.
+        With each which (k,) are its segments, a mask or numbers (j,), parameters (j, ...) of the
+        feet of `points` (k, d), near `s` (k,), and whether it is straight or plane: one parameter
+        does then.
         """
         regions, edges = self.region[segment], self.edges or []
         for region in set(regions.tolist()) if edges else ():
-            edge, here = edges[region], np.flatnonzero(regions == region)
+            edge, here = edges[region], regions == region
             t = np.array([edge.start]) if edge.straight else edge.project(points[here])
             yield edge, here, t, edge.straight
 

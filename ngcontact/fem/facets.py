@@ -83,7 +83,7 @@ class FacetTrace(BoundaryTrace):
 
     def _feet(
         self, segment: Index, points: Array, s: Array
-    ) -> Iterator[tuple[CadEdge | CadFace, Index, Array, bool]]:
+    ) -> Iterator[tuple[CadEdge | CadFace, Index | Mask, Array, bool]]:
         return feet_on_faces(self.mesh, segment, points, s)
 
     def places(self, segments: Index) -> Array:

@@ -97,12 +97,12 @@ def congruent(matrix: ng.BaseMatrix, T: sp.csr_array) -> tuple[sp.csr_array, ng.
     matrix only the change is multiplied and handed over, a small part of the whole. Where it is
     not, as where many bodies meet, NGSolve gets none: see `cholesky_of_closed_rows`.
     """
-    A = shared(matrix)
     # element="physical" has fewer node values than edge unknowns
-    if A.nnz <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
+    if matrix.nze <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
         right = handed_over(T)
         product = right.CreateTranspose() @ (matrix @ right)
         return shared(product), product
+    A = shared(matrix)
     change = change_of_basis(A, T)
     if change.nnz > MAX_CHANGE * A.nnz:
         return A + change, None
