@@ -29,7 +29,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Index, Mask, from_triplets, rows_of
 from ..fem import BoundaryTrace, FacetTrace
 from ..lagrange import lagrange
-from ..problem import Contact, MeshArrays
+from ..problem import Contact
 from ..reference import triangle
 from .facing import (
     SLIVER,
@@ -337,8 +337,12 @@ def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> Boun
     for contact in (with_roles(trace, contact) for contact in contacts):
         facets, facing = trace.segments(contact.secondary), trace.segments(contact.primary)
         vertices, others = (np.unique(trace.nodes[x, :3]) for x in (facets, facing))
-        if contact.rows == "nodal" or not others.size or _coincide(trace, vertices, others):
+        if contact.rows == "nodal" or not others.size:
             continue
+        x = trace.arrays.vertices
+        apart = cKDTree(x[others]).query(x[vertices])[0].max(initial=0.0)
+        if apart <= MATCHING_DISTANCE * np.ptp(x[vertices], axis=0).max():
+            continue  # nodes face nodes
         reach = None
         if contact.direction is None:
             reach = distances(trace, nodal_line(trace, contact)[0])
@@ -346,10 +350,3 @@ def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> Boun
         partly = (share > SLIVER) & (share < WHOLE_SHARE)
         chosen[trace.nodes[facets[partly], 3:]] = True
     return replace(trace, bernstein=chosen) if chosen.any() else trace
-
-
-def _coincide(trace: FacetTrace, vertices: Index, others: Index) -> bool:
-    """Whether all `vertices` (k,) lie at one of the `others` (q,)."""
-    x = MeshArrays(trace.mesh).vertices
-    distance, _ = cKDTree(x[others]).query(x[vertices])
-    return bool(distance.max(initial=0.0) <= MATCHING_DISTANCE * np.ptp(x[vertices], axis=0).max())

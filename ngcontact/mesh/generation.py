@@ -138,8 +138,7 @@ class Edge:
             distance = np.abs(run[:, None] - nodes).min(axis=1)
             nodes = np.concatenate([nodes, run[distance > MIN_NODE_DISTANCE * spacing]])
         nodes = np.sort(nodes)
-        inside = nodes[(nodes > NODE_DISTANCE) & (nodes < 1 - NODE_DISTANCE)]
-        inside = inside[np.diff(inside, prepend=-1.0) > NODE_DISTANCE]
+        inside = nodes[1:][np.diff(nodes) > NODE_DISTANCE][:-1]
         result = inside.tolist()
         t = np.linspace(start, stop, DIVISION_SAMPLES)
         x = self.curve.point(t)
