@@ -238,10 +238,7 @@ class AdmissibleSet:
 def admissible_set(
     space: Space, conditions: Conditions, found: Sequence[ContactLine], passed: Index
 ) -> AdmissibleSet:
-    """K_h for the `conditions` of supports and the contact points `found` of each pair.
-
-    Rows `passed` (k,) become unknowns of the bodies that they face.
-    """
+    """K_h by the `conditions` and the points `found`; rows `passed` (k,) have hosts in front."""
     trace = space.trace
     lines, rows = merged(list(found), contact_rows(list(found), trace))  # (2.3), (2.5), (2.10)
     length = float(np.abs(trace.curve).max())

@@ -33,9 +33,7 @@ LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 ADDED_DEGREES = 2  # of the mesh's curved sides, to see their error
 # Multiple of the measured error of a load's work that is allowed; up to .21 was met.
 QUADRATURE_ERRORS = 3.0
-# Motion at free unknowns, of that at rows, below which it is no better pinned there: levers of a
-# hundredth, the thickness of a plate, made systems singular.
-ROW_SHARE = 0.02
+ROW_SHARE = 0.02  # of a motion, at free unknowns: a lever of a plate's thickness, .01, is no pin
 WORK_NOISE = 1e-10  # work that is allowed besides, relative to the sum of its terms: round-off
 FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
 MIN_RESISTANCE = 1e-2  # change of gaps by a unit motion, below which contact hardly resists it

@@ -123,11 +123,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> dict[tuple[str, int], str]
 
 
 def _lost(solution: Solved) -> str:
-    """Message where round-off of the stiffer body's forces is large beside those of contact.
-
-    Forces out of balance add up like errors of random signs. Forces that pull show the same where
-    the active set was judged by such forces.
-    """
+    """Message where round-off of a stiff body's forces is large, or made contact pull; else ""."""
     p, u, force = solution.discrete.program, solution.minimiser.u, solution.force
     residual = (p.b - p.K @ u - p.pull(force))[~p.fixed]
     pulling = -force[~p.equality].min(initial=0.0)

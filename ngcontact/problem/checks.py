@@ -69,12 +69,10 @@ def dimension_of(geometry: OCCGeometry | ng.Mesh) -> int:
                 "the geometry has no solids, and its faces lie in no plane z = const: give solids "
                 "with their volume, or faces in the plane z = 0"
             )
-        for face in geometry.shape.faces:
-            if face.mass < 0:  # Netgen fails, or never returns
-                raise ValueError(
-                    f'the face "{face.name}" is drawn clockwise, its area is {face.mass:.6g}: draw '
-                    "it anticlockwise"
-                )
+        for face in (x for x in geometry.shape.faces if x.mass < 0):  # Netgen may never return
+            raise ValueError(
+                f'"{face.name}" is drawn clockwise, its area is {face.mass:.6g}: turn it round'
+            )
         return 2
     faces = Counter(face for solid in solids for face in solid.faces)
     if len(faces) < len(set(geometry.shape.faces)):
@@ -139,10 +137,7 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
 
 
 def check_numbers(view: MeshArrays) -> None:
-    """Refuse vertices of no element, as those of second order have, and facets that occur twice.
-
-    And outer sides that are no facets, which no estimate would see.
-    """
+    """Refuse vertices of no element, facets that occur twice, outer sides that are no facets."""
     unused = np.bincount(view.elements.ravel(), minlength=len(view.vertices)) == 0
     if unused.any():
         first = int(np.argmax(unused))
@@ -165,8 +160,7 @@ def check_numbers(view: MeshArrays) -> None:
     if outer != (named := np.count_nonzero(~view.inner_facets)):
         raise ValueError(
             f"the boundaries of the mesh have {named} of its {outer} outer sides, and estimates "
-            "would not see the others: give all of these a name, and no others, as "
-            "ngcontact.mesh.read does"
+            "see no others: give these a name, and no others, as ngcontact.mesh.read does"
         )
 
 
