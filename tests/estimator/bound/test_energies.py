@@ -11,11 +11,12 @@ import pytest
 from drivers.reference import axisymmetric_cases, cases, paper
 from drivers.reference.overkill import Overkill
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact.estimator.bound import force_bar
 from ngcontact.geometries import blocks, rounded_punch
 from ngcontact.geometries.region import body, compound, polygon
 from tests.estimator.bound.test_equilibrium import opening
 from tests.estimator.bound.test_exact import settled
-from tests.scenes import divided, unmatched_blocks
+from tests.scenes import unmatched_blocks
 
 ANISOTROPIC = Hooke([[100.0, 20.0, 5.0], [20.0, 10.0, 1.0], [5.0, 1.0, 3.0]])
 BILATERAL = [Contact("upper_contact", "lower_contact", bilateral=True)]
@@ -141,39 +142,6 @@ def test_effectivity_beside_a_finer_solution(name):
     assert ratios[-1] <= last
 
 
-def in_a_step(rows, slope=0.0):
-    """A block in the corner of a step; its wall leans by `slope`."""
-    block = [(0, 0), (1, 0), (1, 1), (slope, 1)]
-    step = [(-0.6, -0.7), (1.4, -0.7), (1.4, 0), (0, 0), (slope, 1), (-0.6, 1)]
-    geometry = compound(
-        body("block", polygon(block, ["foot", "right", "top", "flank"])),
-        body("step", polygon(step, ["bottom", "side", "floor", "wall", "side", "side"])),
-    )
-    if rows == "dual":
-        geometry = divided(geometry, {"foot": 3, "flank": 3, "wall": 2, "floor": 2})
-    return Problem(
-        geometry=geometry,
-        materials={"block": Elastic(E=1.0, nu=0.3), "step": Elastic(E=3.0, nu=0.2)},
-        displacement={"bottom": (0, 0)},
-        traction={"top": (0, -0.02), "right": (-0.01, 0)},
-        contact=[Contact("foot|flank", "floor|wall", rows=rows)],
-    )
-
-
-@pytest.mark.parametrize("slope", [0.0, -0.5, 0.4])
-@pytest.mark.study(witness=["0.0"])
-def test_dual_rows_on_both_sides_of_a_corner(slope):
-    """The corner's vertex takes what both sides ask for."""
-    *_, fine = adapt(in_a_step("auto", slope), order=4, max_dofs=6000)
-    reference = Overkill(fine)
-    for order in (1, 2, 3):
-        solution = solve(in_a_step("dual", slope), maxh=0.4, order=order)
-        settled(solution)
-        error = reference.relative_error(solution) * fine.energy_norm
-        # The reference is singular at other corners of the step, too.
-        assert error - fine.error_bound <= solution.error_bound <= 2 * error
-
-
 def test_no_loads_no_error():
     problem = Problem(
         geometry=blocks(),
@@ -229,6 +197,22 @@ def test_the_proved_bar_is_as_large_as_the_error_of_a_displaced_block(order, bil
     assert row.proved == pytest.approx(solution.error_bound**2 / d, rel=1e-6)  # measured 6e-10
     error = abs(row.value - abs(fine.contact_force()[1]))
     assert error <= row.proved <= 1.6 * error  # measured 1.13, 1.31, 1.43
+
+
+def test_the_proved_bar_is_that_of_the_force_the_other_way(monkeypatch):
+    """Errors of F and -F are one: what lowers the bar of the one and raises the other's counts."""
+    bars = []
+
+    def both(proof, u, G, directions):
+        other = ng.GridFunction(G.space)
+        other.vec.data = -G.vec
+        bars.append(force_bar(proof, u, G, directions))
+        bars.append(force_bar(proof, u, other, [-e for e in directions]))
+        return bars[0]
+
+    monkeypatch.setattr("ngcontact.estimator.quantities.readings.force_bar", both)
+    solve(cases.hertz_contact().problem, maxh=0.3, order=2).quantities()
+    assert bars[1] == pytest.approx(bars[0], rel=1e-9)
 
 
 ROUGH = {  # largest effectivity; measured 1.11, 1.17, 1.05, 1.05, without vertices there 1.2 to 6
