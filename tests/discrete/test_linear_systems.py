@@ -96,24 +96,6 @@ def test_motions_that_no_contact_resists_ask_for_a_factor(large):
     np.testing.assert_allclose(result.u, u, rtol=0, atol=1e-10 * np.abs(u).max())
 
 
-@pytest.mark.parametrize("order", [1, 3])
-def test_points_are_moved(order):
-    """The jumps are those asked for, forces act there alone, and do the work of the energy."""
-    solution = solve(cases.hertz_contact(half_width=0.5).problem, maxh=0.2, order=order)
-    discrete, active = solution.discrete, solution.active
-    jumps = np.where(active, 1.0, 0.0)
-    found = discrete.influence(active, jumps)
-    assert (found.factorizations, found.back_solves) == (0, 1)
-    g = discrete.displacement(found.u, None).vec.FV().NumPy()
-    nodes = discrete.basis.T @ found.u
-    # Round-off of one back-solve: measured 1e-15 to 1e-13.
-    assert np.abs((discrete.rows.matrix @ nodes - 1)[active]).max() <= 1e-12
-    assert np.all(found.force[~active] == 0)
-    energy = discrete.space.energy(g)
-    assert -found.force @ jumps == pytest.approx(energy, rel=1e-10)
-    assert discrete.systems.program is discrete.program
-
-
 def test_nearly_incompressible_bodies(large):
     """Gauss-Seidel sweeps are slow there: that is seen soon."""
     stiff = Elastic(E=1.0, nu=0.4999)

@@ -14,8 +14,6 @@ DOCS = ROOT / "docs"
 _FENCE = re.compile(
     r"^(?P<indent> *)```(?P<info>[^\n`]*)\n(?P<body>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL
 )
-_TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_OPTION = re.compile(r"^:[\w-]+:.*\n", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -43,26 +41,6 @@ def blocks(page: str, text: str) -> Iterator[Block]:
             options = re.match(r"(?::[\w-]+:.*\n)*", body).group()
             line = text.count("\n", 0, fence.start("body")) + options.count("\n") + 1
             yield Block(page, line, body[len(options) :], cell, "remove-stderr" in options)
-
-
-def listed(page: Path) -> set[Path]:
-    """Pages that the tables of contents of a page list."""
-    found = set[Path]()
-    for match in _TOCTREE.finditer(page.read_text()):
-        for entry in _OPTION.sub("", match.group(1)).split("\n"):
-            name = re.sub(r"^.*<(.*)>$", r"\1", entry.strip())
-            if name:
-                found |= {path.resolve() for path in page.parent.glob(f"{name}.md")}
-    return found - {page}
-
-
-def reached(page: Path) -> set[Path]:
-    """Pages that a reader comes to from a page, itself included."""
-    found, fresh = set[Path](), {page}
-    while fresh:
-        found |= fresh
-        fresh = set().union(*map(listed, fresh)) - found
-    return found
 
 
 def resolved(name: str) -> object:

@@ -130,19 +130,10 @@ def same_points(first, other, motion):
     return same, number[same]
 
 
-def apart(ends, images, motion, length):
-    """Distance of the transitions `images` from those of the first solution over `length`."""
-    if len(ends) != len(images) or len(ends) == 0:
-        return 0.0 if len(ends) == len(images) else math.inf
-    origin = motion.place(ends[:1])
-    distance, _ = cKDTree(images - origin).query(motion.place(ends) - origin)
-    return float(distance.max() / (motion.length * length))
-
-
 def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
     """What `other` misses of the image of `first`, each relative to the largest of its kind.
 
-    Infinite where active sets, steps or the number of transitions differ.
+    Infinite where active sets or steps differ.
     """
     same, number = same_points(first, other, motion)
     complete = len(same) == len(np.unique(number)) == len(first.points) == len(other.points)
@@ -179,10 +170,6 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
         # What is left where the stresses of neighbours cancel.
         "indicators": off(
             other.indicators[triangle] / (root * size), first.indicators, first.energy_norm
-        ),
-        "relative": abs(other.relative_error_estimate / first.relative_error_estimate - 1),
-        "transitions": apart(
-            first.transitions(), other.transitions(), motion, np.ptp(first.points, axis=0).max()
         ),
     }
     return {name: value if value == value else math.inf for name, value in found.items()}

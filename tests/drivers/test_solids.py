@@ -2,15 +2,7 @@
 
 import pytest
 
-from drivers.solids import ball, balls, blocks, cup, cylinders, ellipse, layered, press_fit
-
-
-@pytest.mark.parametrize(("matched", "largest"), [(True, 1e-3), (False, 5e-4)])
-def test_a_press_fit_of_order_3(matched, largest):
-    """Measured: 1.8e-4 and 8.8e-5."""
-    mean, _ = press_fit(3, 1.0, matched)
-    assert abs(mean.difference) < largest
-    assert mean.seconds > 0
+from drivers.solids import ball, balls, blocks, cup, cylinders, ellipse, layered
 
 
 @pytest.mark.study

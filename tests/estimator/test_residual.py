@@ -12,8 +12,6 @@ from drivers.reference import cases
 from drivers.reference.curved import rings as ring_solution
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.estimator.contact import remaining
-from ngcontact.estimator.terms import Parts
 from ngcontact.geometries import rings
 from ngcontact.geometries.region import compound
 from ngcontact.problem import MeshArrays
@@ -221,23 +219,6 @@ def test_a_bilateral_pair_must_neither_open_nor_overlap(patch, gap):
 LAW = Elastic(E=1.0, nu=0.3)
 # Plane strain under -1 along y.
 PRESSED = ng.CF((0.3 * 1.3 * ng.x, -(1 - 0.3**2) * ng.y))
-
-
-def parts(*triples):
-    segment, start, stop = zip(*triples, strict=True)
-    return Parts(np.array(segment), np.array(start), np.array(stop))
-
-
-def test_what_is_left_of_segments():
-    inner = np.array([False, False, True, False, False])
-    covered = [
-        parts((0, 0.0, 1.0), (1, 0.25, 0.5)),
-        parts((1, 0.5, 0.75), (1, 0.3, 0.6), (3, 0.5, 1.0)),
-    ]
-    left = remaining(inner, covered)
-    found = list(zip(left.segment, left.start, left.stop, strict=True))
-    assert found == [(1, 0.0, 0.25), (1, 0.75, 1.0), (3, 0.0, 0.5), (4, 0.0, 1.0)]
-    assert remaining(inner, []).segment.tolist() == [0, 1, 3, 4]
 
 
 UPPER = rectangle("upper", (0, 1), (0, 1), ("upper_contact", "side", "top", "side"))

@@ -128,23 +128,6 @@ def test_upright_faces_in_contact_are_seen_from_above(sliding, tmp_path):
     assert 0.05 < (image.get_array() == 255).all(axis=2).mean() < 0.7  # bodies and background
 
 
-def test_a_zone_of_two_parts_is_cut_in_one_and_not_joined(tmp_path):
-    """A plate on two columns: the middle of their tops is in the air."""
-    columns = [((-1, 0, -1), (-0.5, 1, 0)), ((0.5, 0, -1), (1, 1, 0))]
-    problem = Problem(
-        geometry=boxes(column=columns, plate=[((-1, 0, 0), (1, 1, 1))]),
-        materials={"column": Elastic(E=1.0, nu=0.3), "plate": Elastic(E=1e3, nu=0.3)},
-        displacement={"column_bottom": (0, 0, 0)},
-        traction={"plate_top": PRESSURE},
-        contact=[Contact("column_top", "plate_bottom")],
-    )
-    figure = plot_solids(solve(problem, maxh=0.7, order=1), tmp_path / "a.png")
-    x, y, _ = panel(figure, "contact pressure").lines
-    assert np.isnan(x.get_ydata()).sum() == 1
-    assert not np.isnan(y.get_ydata()).any()
-    assert np.nanmin(x.get_ydata()) > 0  # also on the other column
-
-
 def test_what_is_positive_has_no_negative_colours(tmp_path):
     """A step, between whose nodal values 0, 0, 1 the polynomials of curved cells have -1/8."""
     step = ng.IfPos(ng.x - 0.1, 1.0, 0.0)

@@ -214,22 +214,6 @@ def test_a_secondary_wider_than_its_primary(order):
     assert order == 3 or values.min() >= 0
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
-def test_facets_beside_matched_ones_have_no_area(order):
-    """Nodes face nodes under the upper cube; facets around it share some of them."""
-    bodies = ("a", (0, 0, 0), (2, 2, 1), (4, 4, 2)), ("b", (0.5, 0.5, 1), (1.5, 1.5, 2), (2, 2, 2))
-    problem = Problem(
-        boxes(*bodies),
-        {".*": Elastic(1.0, 0.3)},
-        displacement={"a_bottom": (0, 0, 0), "b_top": (0, 0, -0.01)},
-        contact=[Contact("a_top", "b_bottom", roles="given")],
-    )
-    solution = solve(problem, order=order)
-    assert solution.contact_area() == pytest.approx(1.0, rel=1e-9)
-    found = ng.Integrate(solution.pressure_field(), solution.mesh.Boundaries("a_top"))
-    assert found == pytest.approx(solution.force.sum(), rel=1e-9)
-
-
 def test_the_wide_side_follows_a_round_rim():
     """The foot of a guided cylinder of radius 0.5 on a block, whose top carries the points.
 
