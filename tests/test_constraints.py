@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ngcontact.arrays import from_triplets, joined
-from ngcontact.constraints import STIFFNESS_CONTRAST, Conditions, Rows, change_of_basis, no_rows
+from ngcontact.constraints import STIFFNESS_CONTRAST, Conditions, Rows, change_of_basis
 from ngcontact.lagrange import lagrange
 
 X, Y = (1.0, 0.0), (0.0, 1.0)
@@ -49,19 +49,6 @@ def test_matrix_of_rows():
     np.testing.assert_allclose(B.toarray(), expected, atol=1e-16)
     assert B.nnz == 7  # nothing stored where the partner has no share
     assert rows(3).matrix.shape == (0, 6)
-
-
-def test_rows_joined_and_selected_are_the_same():
-    entries = (0, unit(0.1), {2: 1.0}), (1, unit(0.2), {}), (2, unit(0.3), {3: 0.25, 4: 0.75})
-    whole = rows(5, *entries, g=[0.1, 0.2, 0.3])
-    parts = [rows(5, entry, g=[gap]) for entry, gap in zip(entries, whole.g, strict=True)]
-    together = joined([no_rows(5), *parts])
-    for one, other in ((together, whole), (whole.select(np.array([2, 0])), joined(parts[::-2]))):
-        assert (one.matrix != other.matrix).nnz == 0
-        np.testing.assert_array_equal(one.node, other.node)
-        np.testing.assert_array_equal(one.g, other.g)
-        np.testing.assert_array_equal(one.equality, other.equality)
-    assert no_rows(5).matrix.shape == (0, 10)
 
 
 def test_rows_with_one_left_side_are_alike():

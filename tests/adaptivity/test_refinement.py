@@ -94,15 +94,6 @@ def test_an_unmarked_facing_segment_is_divided_once_and_no_further():
         assert len(vertices(result, side)) == len(vertices(mesh, side)) + 1
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_uniform_refinement_quadruples_the_elements(name):
-    problem = ALL[name].problem()
-    mesh = first_mesh(problem, 0.5)
-    result = refined(problem, mesh)
-    assert result.ne == 4 * mesh.ne
-    assert result.nv == mesh.nv + mesh.nedge
-
-
 @SIDES
 @pytest.mark.parametrize("name", ["bounded polygon", "bounded rings", "enlarging disc on block"])
 def test_several_bisections(name, side):

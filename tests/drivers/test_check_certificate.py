@@ -137,6 +137,8 @@ TAMPERED = {
     "a negative norm": alike("lifting", np.negative),
     "loads that take off": alike("loads", lambda v: v - 1.0),
     "not a number": alike("stress", lambda v: changed(v, np.nan)),
+    **{f"no {name}": lambda a, name=name: {name: None} for name in ("stress", "contact_gap")},
+    "no strains": lambda a: {"rule0_strain": None},
 }
 
 TAMPERED_LOADS = {
@@ -190,17 +192,11 @@ def saved(tmp_path_factory):
 )
 def test_tampered_certificates_fail(kind, name, saved, tmp_path, capsys):
     _, arrays, _ = saved[kind]
-    np.savez(tmp_path / "tampered.npz", **(arrays | KINDS[kind][name](arrays)))
-    assert not check_certificate.check(tmp_path / "tampered.npz")
-    assert "FAIL" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("missing", ["stress", "contact_gap", "rule0_strain"])
-def test_files_with_an_array_less_fail(missing, saved, tmp_path):
-    _, arrays, _ = saved["hertz"]
-    rest = {name: v for name, v in arrays.items() if name != missing}
+    changes = arrays | KINDS[kind][name](arrays)
+    rest = {name: array for name, array in changes.items() if array is not None}
     np.savez(tmp_path / "tampered.npz", **rest)
     assert not check_certificate.check(tmp_path / "tampered.npz")
+    assert "FAIL" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["contact_weight", "contact_gap", "contact_pressure"])

@@ -77,48 +77,51 @@ def levels(case, order, unknowns):
     return errors, estimates, found[-1], math.log2(errors[-2] / errors[-1])
 
 
-# Required: effectivity in [1, 10], optimal rates. Measured 5.0 to 9.8. Rates come from below until
-# the layers are resolved in which a soft layer meets one 1e6 times stiffer: .82, 1.86, 3.84 here,
-# and .576 on the first two meshes of all.
+def pressed_along(stiffness, degrees):
+    """Weights are those of the softest strain: estimates grow as the root of the stiffness.
+
+    Measured .70 to 1.13 of that, times the 5.2 of the isotropic law. Bounds feel it, too, but less:
+    2.9 to 3.5 and 27 to 34.
+    """
+    largest = 1.2 * math.sqrt(stiffness) * 5.2
+    return pressed_fibres(stiffness, math.radians(degrees)), (largest, largest, largest / 10)
+
+
+def varying(make, contrast):
+    """Required: effectivity in [1, 10]. Measured 5.0 to 9.8, and 1.07 to 1.27 of bounds.
+
+    On the first mesh at 1e6 11.85, as no element follows the force.
+    """
+    return make(contrast), (12, 10, 1.5)
+
+
+# Largest effectivities on the first mesh and on others, and of the last bound. Rates come from
+# below until the layers are resolved in which a soft layer meets one 1e6 times stiffer: .82, 1.86,
+# 3.84 here, and .576 on the first two meshes of all; of fibres measured .95 to 1.053 of the order.
 @pytest.mark.parametrize(
-    ("make", "contrast", "order", "unknowns", "rate"),
+    ("case", "order", "unknowns", "low", "high"),
     [
-        (stiff_and_soft, 1e2, 1, 400, 0.55),
-        (stiff_and_soft, 1e2, 1, 4000, 0.95),
-        (stiff_and_soft, 1e6, 1, 4000, 0.8),
-        (stiff_and_soft, 1e6, 2, 13_500, 1.8),
-        (stiff_and_soft, 1e6, 4, 13_500, 3.8),
-        (graded, 1e2, 1, 1200, 0.95),
-        (graded, 1e6, 2, 5000, 1.9),
+        (varying(stiff_and_soft, 1e2), 1, 400, 0.55, 1.1),
+        (varying(stiff_and_soft, 1e2), 1, 4000, 0.95, 1.1),
+        (varying(stiff_and_soft, 1e6), 1, 4000, 0.8, 1.1),
+        (varying(stiff_and_soft, 1e6), 2, 13_500, 1.8, 2.2),
+        (varying(stiff_and_soft, 1e6), 4, 13_500, 3.8, 4.4),
+        (varying(graded, 1e2), 1, 1200, 0.95, 1.1),
+        (varying(graded, 1e6), 2, 5000, 1.9, 2.2),
+        (pressed_along(1e2, 30), 1, 1200, 0.94, 1.06),
+        (pressed_along(1e4, 71), 1, 1200, 0.94, 1.06),
+        (pressed_along(1e2, 0), 2, 5000, 1.88, 2.12),
+        (pressed_along(1e4, 30), 2, 5000, 1.88, 2.12),
     ],
 )
-@pytest.mark.study(witness=["stiff_and_soft-100.0-1-400-0.55"])
-def test_moduli_that_vary_along_the_mesh(make, contrast, order, unknowns, rate):
-    errors, estimates, finest, last = levels(make(contrast), order, unknowns)
-    assert estimates.min() >= 1
-    assert estimates.max() <= 12  # 11.85 on the first mesh at 1e6, whose force no element follows
-    assert estimates[1:].max() <= 10
-    assert last >= rate
-    if make is stiff_and_soft:
-        # Measured 1.07 to 1.27.
-        assert 1 <= finest.relative_error_bound / errors[-1] <= 1.5
-
-
-@pytest.mark.parametrize(
-    ("order", "unknowns", "stiffness", "angle"),
-    [(1, 1200, 1e2, 30), (1, 1200, 1e4, 71), (2, 5000, 1e2, 0), (2, 5000, 1e4, 30)],
-)
-@pytest.mark.study(witness=["1-1200-100.0-30"])
-def test_stiff_fibres(order, unknowns, stiffness, angle):
-    case = pressed_fibres(stiffness, math.radians(angle))
+@pytest.mark.study(witness=["case0-1-400-0.55-1.1", "case7-1-1200-0.94-1.06"])
+def test_laws_that_vary_and_stiff_fibres(case, order, unknowns, low, high):
+    case, (first, others, bound) = case
     errors, estimates, finest, rate = levels(case, order, unknowns)
-    assert rate == pytest.approx(order, rel=0.06)  # measured .95 to 1.053 of it
-    # Weights are those of the softest strain: the root of the stiffness. Measured .70 to 1.13
-    # of it, times the 5.2 of the isotropic law.
-    assert estimates.min() >= 1
-    assert estimates.max() <= 1.2 * math.sqrt(stiffness) * 5.2
-    # The bound's patches feel it, too, but less: 2.9 to 3.5 and 27 to 34.
-    assert 1 <= finest.relative_error_bound / errors[-1] <= estimates[-1] / 10
+    assert 1 <= estimates.min() <= estimates.max() <= first
+    assert estimates[1:].max() <= others
+    assert low <= rate <= high
+    assert 1 <= finest.relative_error_bound / errors[-1] <= bound
 
 
 @pytest.mark.parametrize("order", [1, 2])

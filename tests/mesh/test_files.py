@@ -1,9 +1,10 @@
-"""Meshes of files: Gmsh's formats, written here, what is kept of them, and what is refused."""
+"""Meshes of files: Gmsh's formats, what is kept of them, and what is refused."""
 
 import math
 import warnings
 from dataclasses import replace
 
+import meshio
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -15,14 +16,9 @@ from ngcontact.mesh import cad_edges, curve, first_mesh, read
 from ngcontact.problem import MeshArrays
 from tests.test_fits import exact, fit
 
-KINDS = {
-    ("line", 1): 1,
-    ("tri", 1): 2,
-    ("line", 2): 8,
-    ("tri", 2): 9,
-    ("quad", 1): 3,
-    ("tet", 1): 4,
-}
+NAMES = {"line": ("line", "line3"), "tri": ("triangle", "triangle6")}
+NAMES |= {"quad": ("quad",), "tet": ("tetra",)}
+DIMS = {"line": 1, "tri": 2, "quad": 2, "tet": 3}
 
 
 class File:
@@ -33,49 +29,22 @@ class File:
         self.blocks = blocks
 
     def write(self, path, version, order=1):
-        """As Gmsh does, in text."""
-        dims = {"line": 1, "tri": 2, "quad": 2, "tet": 3}
-        groups = dict.fromkeys((dims[kind], name) for kind, _, name in self.blocks if name)
-        tags = {group: k for k, group in enumerate(groups, start=1)}
-        lines = [
-            "$MeshFormat",
-            f"{version} 0 8",
-            "$EndMeshFormat",
-            "$PhysicalNames",
-            str(len(tags)),
-        ]
-        lines += [f'{dim} {tag} "{name}"' for (dim, name), tag in tags.items()]
-        lines += ["$EndPhysicalNames"]
-        nodes = [f"{x!r} {y!r} {z!r}" for x, y, z in self.points.tolist()]
-        count, total = len(nodes), sum(len(cells) for _, cells, _ in self.blocks)
-        if version == 2.2:
-            lines += ["$Nodes", str(count), *(f"{k} {x}" for k, x in enumerate(nodes, start=1))]
-            lines += ["$EndNodes", "$Elements", str(total)]
-            number = 0
-            for entity, (kind, cells, name) in enumerate(self.blocks, start=1):
-                tag = tags.get((dims[kind], name), 0)
-                for cell in (cells + 1).tolist():
-                    number += 1
-                    head = [number, KINDS[kind, order], 2, tag, entity]
-                    lines.append(" ".join(map(str, head + cell)))
-        else:
-            each = {dim: [] for dim in range(4)}
-            for entity, (kind, _, name) in enumerate(self.blocks, start=1):
-                tag = tags.get((dims[kind], name))
-                own = f"1 {tag}" if tag else "0"
-                each[dims[kind]].append(f"{entity} 0 0 0 0 0 0 {own} 0")
-            lines += ["$Entities", " ".join(str(len(each[dim])) for dim in range(4))]
-            lines += [line for dim in range(4) for line in each[dim]]
-            lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 1 0 {count}"]
-            lines += [*map(str, range(1, count + 1)), *nodes, "$EndNodes"]
-            lines += ["$Elements", f"{len(self.blocks)} {total} 1 {total}"]
-            number = 0
-            for entity, (kind, cells, _) in enumerate(self.blocks, start=1):
-                lines.append(f"{dims[kind]} {entity} {KINDS[kind, order]} {len(cells)}")
-                for cell in (cells + 1).tolist():
-                    number += 1
-                    lines.append(" ".join(map(str, [number, *cell])))
-        path.write_text("\n".join([*lines, "$EndElements", ""]))
+        """In Gmsh's text format; each block is an entity, which has one of the nodes at least."""
+        groups = [(name, DIMS[kind]) for kind, _, name in self.blocks]
+        tags = {group: k for k, group in enumerate(dict.fromkeys(groups), start=1) if group[0]}
+        own = [np.full(len(cells), k) for k, (_, cells, _) in enumerate(self.blocks, start=1)]
+        mesh = meshio.Mesh(
+            self.points,
+            [(NAMES[kind][order - 1], cells) for kind, cells, _ in self.blocks],
+            field_data={name: np.array([tag, dim]) for (name, dim), tag in tags.items()},
+        )
+        named = [0 * k + tags.get(group, 0) for k, group in zip(own, groups, strict=True)]
+        mesh.cell_data = {"gmsh:physical": named, "gmsh:geometrical": own}
+        entity = np.minimum(np.arange(len(self.points)), len(groups) - 1)
+        dims = np.array([dim for _, dim in groups])
+        mesh.point_data["gmsh:dim_tags"] = np.column_stack([dims[entity], entity + 1])
+        mesh.cell_sets["gmsh:bounding_entities"] = [np.zeros(0, dtype=int) for _ in groups]
+        meshio.write(path, mesh, {2.2: "gmsh22", 4.1: "gmsh"}[version], binary=False)
         return path
 
 

@@ -169,13 +169,6 @@ def test_two_cams_without_a_direction_are_told_to_give_one():
     assert first_mesh(along, 0.2).ne > 50
 
 
-def test_a_mesh_has_its_size_already():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
-    with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
-        first_mesh(problem, maxh=0.1)
-
-
 EXACT = 1e-12  # round-off of places; a parabola's vertex on the finer step is good to 1e-9
 T = np.linspace(0.0, 1.0, 513)
 

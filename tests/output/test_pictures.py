@@ -10,10 +10,12 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.geometries.region import compound
 from ngcontact.output import plot_solution, write_film
 from ngcontact.output.pictures import close_ups, colour_range, cut_pressure
 from ngcontact.output.scene import Style, contact_lines, picture
 from tests.output.stubs import pair_of, stub, two_bodies
+from tests.scenes import rectangle
 
 
 @pytest.fixture
@@ -229,3 +231,23 @@ def test_without_contact_there_is_no_pressure_to_draw(tmp_path, pressed_half):
     figure = plot_solution(solve(problem, maxh=0.4), tmp_path / "a.png")
     assert not [axes for axes in figure.axes if axes.get_title() == "contact pressure"]
     assert write_film(tmp_path / "a.gif", [solve(problem, maxh=0.4)]).exists()
+
+
+def test_bodies_that_come_nearer_are_drawn_apart_and_without_the_colours_of_round_off():
+    """One moves by half of the gap; twice as far the picture would show contact."""
+    names = ("bottom", "side", "top", "side")
+    lower, upper = (
+        rectangle(body, (0, 2), y, [f"{body}_{name}" for name in names])
+        for body, y in (("lower", (-2, 0)), ("upper", (0.2, 2)))
+    )
+    problem = Problem(
+        geometry=compound(lower, upper),
+        materials={"lower|upper": Elastic(E=1.0, nu=0.3)},
+        displacement={"lower_bottom": (0, 0), "upper_top": (0, -0.1)},
+        contact=[Contact("upper_bottom", "lower_top")],
+    )
+    solution = solve(problem, maxh=0.7, order=2)
+    assert ng.Integrate(ng.Norm(solution.stress), solution.mesh) > 0
+    drawn = picture(solution, Style())
+    assert drawn.scale == 1
+    assert not drawn.values.any()

@@ -161,14 +161,6 @@ def test_refusals_name_the_first_point():
     assert solution.at(np.zeros((0, 2))).stress.shape == (0, 2, 2)
 
 
-def test_a_table_of_columns():
-    values = solve(two_blocks(), maxh=1.0).along((0.1, 0.1), (0.2, 0.3), 5)
-    table = values.columns()
-    assert {len(column) for column in table.values()} == {5}
-    np.testing.assert_array_equal(table["sxy"], values.stress[:, 0, 1])
-    np.testing.assert_array_equal(table["principal_1"], values.principal_stresses[:, 0])
-
-
 def test_a_line_through_two_bodies_and_its_table():
     """A column under pressure p: stress -p along z in both bodies at most."""
     solution = solve(pressed_cube(), maxh=0.5, order=2)

@@ -74,5 +74,3 @@ def test_what_adapt_refuses():
     ):
         with pytest.raises(ValueError, match="not available for solids"):
             adapt(problem, **options)
-    with pytest.raises(ValueError, match="order=4 is not available; solids have"):
-        adapt(problem, order=4)

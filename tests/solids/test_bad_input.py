@@ -12,7 +12,7 @@ from netgen.meshing import Element2D, Mesh, MeshPoint, Pnt
 from ngsolve.meshes import MakeStructured2DMesh, MakeStructured3DMesh
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.problem import MeshArrays, move_vertices
 from tests.solids.meshes import boxes
 from tests.solids.test_patch import LAWS, blocks, pressed
@@ -172,8 +172,6 @@ def test_what_stays_plane():
         solution.revolved("body.vtu")
     with pytest.raises(ValueError, match="not available for solids"):
         solution.error_bound  # noqa: B018
-    with pytest.raises(ValueError, match="not available for solids"):
-        list(adapt(problem, guaranteed=True))
 
 
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2), (2, 4)])

@@ -142,17 +142,6 @@ def test_effectivity_beside_a_finer_solution(name):
     assert ratios[-1] <= last
 
 
-def test_no_loads_no_error():
-    problem = Problem(
-        geometry=blocks(),
-        materials=cases.BLOCKS,
-        displacement={"top": (0, 0), "bottom": (0, 0)},
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
-    solution = solve(problem, maxh=0.5, order=2)
-    assert solution.error_bound == solution.relative_error_bound == 0
-
-
 def test_parts_are_the_square_of_the_bound():
     solution = solve(cases.hertz_contact().problem, maxh=0.3, order=2)
     parts = solution.bound_parts
