@@ -37,13 +37,11 @@ def _points(trace: BoundaryTrace, facets: Index, degree: int) -> BoundaryPoints:
 
 def surface_terms(solution: ScaledSolution, pairs: Sequence[ContactState]) -> list[BoundaryTerms]:
     """Terms of the whole boundary: of each pair, and of what no pair covers."""
-    terms, uncovered = [], ~solution.boundary.inner
-    for pair in pairs:
-        term, covered = on_zone(solution, pair)
-        terms.append(term)
+    zones, uncovered = [on_zone(solution, pair) for pair in pairs], ~solution.boundary.inner
+    for _, covered in zones:
         uncovered[covered] = False
-    rest = np.flatnonzero(uncovered)
-    return [*terms, on_supports_and_loads(solution, rest)]
+    rest = on_supports_and_loads(solution, np.flatnonzero(uncovered))
+    return [*(term for term, _ in zones), rest]
 
 
 def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTerms:

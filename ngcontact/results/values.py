@@ -71,10 +71,9 @@ class _Finder:
     def find(self, points: Array, at: Index) -> Location:
         """Elements of the points numbered `at` (j,) among `points` (k, d)."""
         found: list[tuple[Index, Index]] = [(np.zeros(0, dtype=np.intp),) * 2]
+        tree = KDTree(points[at])
         for numbers, middles, radius in self.groups if len(at) else ():
-            near = KDTree(points[at]).sparse_distance_matrix(
-                middles, radius, output_type="coo_matrix"
-            )
+            near = tree.sparse_distance_matrix(middles, radius, output_type="coo_matrix")
             found.append((at[near.row], numbers[near.col]))
         point, element = (np.concatenate(part) for part in zip(*found, strict=True))
         reference = self._references(points[point], element)

@@ -324,9 +324,8 @@ def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
 def quantities_of_solids(solution: Estimated, state: ContactState | None, pair: int) -> Quantities:
     """Values of a pair, on levels of `adapt` with errors; without any pair the energy."""
     if state is None:
-        return Quantities(
-            (Quantity("energy", solution.energy),), "without an error, as without pairs"
-        )
+        alone = Quantity("energy", solution.energy)
+        return Quantities((alone,), "without an error, as without pairs")
     values, place = figures(solution, state)
     levels = np.array([*(before[pair] for before in solution.earlier), values])
     known = len(levels) > EARLIER_LEVELS
