@@ -17,6 +17,7 @@ TERM_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of the residual, relative 
 RENEWAL_CYCLES = 20
 # V-cycles for a system, two to three times those of nu = 0.3; then the matrix is factorised.
 MOST_CYCLES = 100
+MOST_STEPS = 50  # systems of one program; likewise
 RESTARTS = 3  # from the residual itself, which the iteration's own drifts from; likewise
 
 log = logging.getLogger("ngcontact")
@@ -27,9 +28,12 @@ class IterativeSystems(BorderedSystems):
 
     Each system starts from the iterate of the one before, and is solved as closely as telling
     the next active set takes, to 1e-2 of its first residual; `refine` takes it to round-off. Where
-    V-cycles do not converge, and for proximal terms, which motions that nothing resists need, the
-    matrix is factorised for good. `prepare` makes multigrid for the unknowns (n,) that are free.
+    V-cycles or active sets do not converge, and for proximal terms, which motions that nothing
+    resists need, the matrix is factorised for good. `prepare` makes multigrid for the unknowns
+    (n,) that are free.
     """
+
+    steps: int  # systems since the last `restart`
 
     def __init__(
         self, program: QuadraticProgram, factor: Factor, prepare: Callable[[Mask], Multigrid]
@@ -43,7 +47,7 @@ class IterativeSystems(BorderedSystems):
     def restart(self, program: QuadraticProgram) -> None:
         """Begin with another load, other values or bounds; multigrid stays."""
         super().restart(program)
-        self.solved = None
+        self.solved, self.steps = None, 0
         if self.coarse is not None:
             self._start(self.coarse)
 
@@ -101,7 +105,9 @@ class IterativeSystems(BorderedSystems):
     def _iterate(self, active: Mask) -> None:
         """Reduce the residual that the last solution has for the active set."""
         p, multigrid = self.program, self._held(active)
-        self.solved = active
+        self.solved, self.steps = active, self.steps + 1
+        if self.steps > MOST_STEPS:
+            raise StalledError("active sets cycle")
         self.y[p.unknown[active]] = p.g[active]
         residual = self.unbalanced(active)
         size = multigrid.largest(residual)

@@ -3,10 +3,11 @@
 The steps of Hintermueller, Ito, Kunisch (2002, SIAM J. Optim. 13:865): (i) choose y and force;
 (ii) rows with force + c (R y - g) > 0 are active, the others not; (iii) solve the linear system of
 that set; (iv) stop when the set repeats, the iterate is the exact minimiser, else go to (ii). The
-method alone can cycle on positive definite problems that are not M-matrices; block principal
-pivoting (Judice, Pires 1994, Comput. Oper. Res. 21:587) makes it finite for all of them. A
-semidefinite matrix, of bodies that supports do not hold, is met by exact proximal steps
-(Rockafellar 1976, SIAM J. Control Optim. 14:877). NumPy and SciPy only.
+method alone can cycle on positive definite problems that are not M-matrices: where the wrong rows
+do not become fewer, the small dense program of all rows that were wrong so far is solved in place
+of (ii). As each step brings a row to it, or is the last one, the method is finite. A semidefinite
+matrix, of bodies that supports do not hold, is met by exact proximal steps (Rockafellar 1976, SIAM
+J. Control Optim. 14:877). NumPy and SciPy only.
 """
 
 from __future__ import annotations
@@ -41,7 +42,6 @@ TIE = 1e-13  # relative size below which a force or a slack keeps its state
 CLEAR_TIE = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
 ROW_RESIDUAL = 1e-8  # of active rows, relative to their terms: in vain in dependent ones
-PATIENCE = 10  # full switches allowed without fewer violated rows: p of Judice and Pires
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
 MIN_PROXIMAL = 1e-6  # of that, to which it falls, tenfold at each proximal step
@@ -59,7 +59,6 @@ class ActiveSetIteration:
     systems: BorderedSystems  # of n unknowns and m rows
     active: Mask  # (m,) current active set
     size: Array  # (m,) sums of the sizes of the rows' coefficients
-    patience: int  # see `minimise`
     y: Array  # (n,) solution of the last linear system
     force: Array  # (m,) its multipliers
     steps: list[int] = field(default_factory=list)  # changes after each linear system
@@ -131,29 +130,28 @@ class ActiveSetIteration:
         """Newton steps until the active set repeats.
 
         Pins of idle motions that become free are prescribed, too. The anchor with these, and
-        whether no other motion became free. Rows on the wrong side change theirs by block principal
-        pivoting: as in Judice and Pires, ninf is the fewest of them so far, and p the full switches
-        left.
+        whether no other motion became free. Rows on the wrong side change theirs, all of them until
+        solving the dense program costs less than full switches that left no fewer have cost.
         """
-        m = self.systems.program.g.size
-        ninf, p = m + 1, self.patience
+        fewest, wasted, small = np.inf, 0, False
         seen: set[bytes] = set()
-        tie, limit = TIE, 100 + 20 * m
+        tie, limit = TIE, 100 + 2 * self.active.size
         for _ in range(limit):
-            switched = wrong = self._solved(anchor, tie)
+            wrong = self._solved(anchor, tie)
             count = int(np.count_nonzero(wrong))
-            ninf, p = (count, self.patience) if count < ninf else (ninf, p - 1)
-            if count and p < 0:  # Murty's rule, until fewer rows are violated
-                switched = np.arange(m) == np.flatnonzero(wrong)[-1]
-            self.steps.append(int(np.count_nonzero(switched)))
-            step = len(self.steps), self.active.sum(), self.steps[-1]
+            self.steps.append(count)
+            step = len(self.steps), self.active.sum(), count
             log.debug("Newton step %d: %d active, %d change", *step)
             if count == 0:
                 return anchor, True  # (iv)
+            wasted += self.systems.border * (count >= fewest)
+            fewest = min(count, fewest)
+            small = self.systems.system is not None and (small or count <= wasted)
+            switched = self.systems.complementary if small else self.active.__xor__
+            self.active = switched(wrong)  # (ii)
             if (key := self.active.tobytes()) in seen:  # by a cycle, or by round-off
-                tie, p = min(10 * tie, WIDEST_TIE), p - PATIENCE
+                tie = min(10 * tie, WIDEST_TIE)
             seen.add(key)
-            self.active = self.active ^ switched  # (ii)
             if (idle := self.idle(anchor)) is None:
                 return anchor, False
             anchor = prescribing(idle, anchor)
@@ -193,14 +191,11 @@ class ActiveSetIteration:
         return np.where(self.active, pulling, penetrating) & ~p.equality
 
 
-def minimise(
-    systems: BorderedSystems, active: Mask | None = None, patience: int = PATIENCE
-) -> Iterate:
+def minimise(systems: BorderedSystems, active: Mask | None = None) -> Iterate:
     """Solve the quadratic program of `systems` by semismooth Newton steps.
 
-    They begin with the first active set `active` (m,), the equalities alone when left out, and may
-    switch all of the wrong rows `patience` times without fewer of them. The result has the
-    multipliers of all rows, equalities included.
+    They begin with the first active set `active` (m,), the equalities alone when left out. The
+    result has the multipliers of all rows, equalities included.
 
     Raises
     ------
@@ -213,7 +208,6 @@ def minimise(
         systems=systems,
         active=p.equality.copy() if active is None else p.equality | active,
         size=np.ones(p.g.size) if p.R is None else np.asarray(abs(p.R).sum(axis=1)).ravel(),
-        patience=patience,
         y=np.where(p.fixed, p.values, 0.0),
         force=np.zeros(p.g.size),
     )

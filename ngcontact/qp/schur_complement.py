@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.optimize import nnls
 
 from ..arrays import Array, Factor, Index, Mask, Solve
 from .quadratic_program import Anchor, QuadraticProgram, SingularError
@@ -17,6 +18,7 @@ COARSE_RESIDUAL = 1e-11  # relative to the largest met, at which the next active
 FINE_RESIDUAL = 1e-14  # ... and of the last system
 BORDER = 20  # back-solves that cost as much as a factorisation: measured 17 to 25
 BORDER_ROUND_OFF = 1e-14  # of its singular values, relative to the largest
+WEAK = 1e-9  # stiffness of pins, compliance of rows in dense programs, that may be singular
 SINGULAR_RESIDUAL = 1e-6  # residual, relative to the first, above which the matrix is singular
 # ... unless it is that of values that balance each other.
 BALANCE_ROUND_OFF = 64 * np.finfo(float).eps
@@ -30,7 +32,10 @@ class Base:
     pinned: Mask  # (q,) pins that it holds
     free: Mask  # (n,) its unknowns
     inverse: Solve  # K_0^-1
-    known: Array  # (k, n) solutions K_0^-1 v of the columns v that borders have had so far
+    # (k, n) solutions K_0^-1 v of the columns v so far, less 1 at the unknown that one releases:
+    known: Array
+    switched: Mask  # (m,) rows that have had such columns
+    columns: list[tuple[Index, Array]] = field(default_factory=list)  # unknowns, values of v, (t,)
     # Which of them belongs to an unknown, or to row j by the key ~j:
     place: dict[int, int] = field(default_factory=dict)
 
@@ -44,9 +49,8 @@ class Border:
     anchor: Anchor | None
     at: Index  # (r,) unknowns that the base alone holds: released ones, and its pins
     rows: Index  # (k - r,) rows that only the system holds
-    column: Index  # (k,) places of K_0^-1 V among the known solutions of the base
-    touched: Index  # (t,) unknowns where V is not zero
-    V: Array  # (k, t) its transpose there
+    place: list[int]  # k places of V among the known columns of the base
+    columns: list[tuple[Index, Array]]  # their unknowns and values (t,)
     size: Array  # (k,) roots of the diagonal of S
     # (k, k) the Schur complement, over these: only so are small pivots seen, as forces stand
     # beside displacements.
@@ -167,6 +171,40 @@ class BorderedSystems:
             return residual
         return residual - p.pull(self.force)
 
+    def complementary(self, wrong: Mask) -> Mask:
+        """Active set (m,) that is right for the rows `wrong` (m,) and all that switched before.
+
+        The other rows keep their state in the base. With the Schur complement C of these rows their
+        slacks t minimise 1/2 t'C t + c't, t >= 0: a problem of nonnegative least squares.
+        """
+        p, system = self.program, self.system
+        assert system is not None
+        base, residual = system.base, self.unbalanced(system.active, system.anchor)
+        border = self._bordered(base, base.active ^ (base.switched | wrong), system.anchor)
+        r, held = border.at.size, np.flatnonzero(base.active & base.switched)
+        row = np.concatenate([held, np.full(r - held.size, -1), border.rows])
+        force, slack = self.force[row] * (row >= 0), (p.g - p.left_sides(self.y))[row]
+        size = np.concatenate([np.sqrt(p.diagonal[border.at]), border.size[r:]])
+        share = border.size / size
+        S = border.S * share * share[:, None]
+        # Of S z + w, forces at unknowns and slacks of added rows, the rows that the base does not
+        # hold are inverted, for z = -t of the others and w = t of these.
+        w = np.concatenate([force[:r] + residual[border.at], slack[r:]]) / size
+        at, free = np.arange(row.size) >= held.size, (row >= 0) & ~p.equality[row]
+        S.flat[:: row.size + 1] += WEAK * at * np.sign(row + 0.5)
+        inverse = np.linalg.inv(S[at][:, at])
+        across = S[:, at] @ inverse
+        N = S - across @ S[at]
+        N[:, at], N[at] = across, -across.T
+        N[held.size :, held.size :] = inverse
+        c = N @ np.where(at, -w, slack * size) + np.where(at, force * size, w)
+        values, vectors = np.linalg.eigh((N * np.where(at, 1.0, -1.0))[free][:, free])
+        root = np.sqrt(np.maximum(values, BORDER_ROUND_OFF * values[-1]))
+        t, _ = nnls((vectors * root).T, -(vectors.T @ c[free]) / root)
+        active = system.active.copy()
+        active[row[free]] = t == 0
+        return active
+
     def stiffness(self) -> Array:
         """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
         p, base = self.program, self.base
@@ -202,7 +240,8 @@ class BorderedSystems:
         if base is not None and not pulled[~base.pinned].any():
             added, at = self._changed(base, active, anchor)
             columns = base.place.keys() | {*at.tolist(), *(~added).tolist()}
-            if len(columns) <= self.border + np.count_nonzero(base.pinned):
+            k = len(columns)
+            if k <= self.border + np.count_nonzero(base.pinned) or k == len(base.place):
                 return base
         self.forget()  # two factorisations at a time would double the memory
         closed = active & (p.R is None)
@@ -210,7 +249,8 @@ class BorderedSystems:
         pinned = p.null_space.weakly_resisted(held) | (pulled > 0)
         free = ~p.fixed
         free[np.concatenate([p.null_space.held, p.null_space.pins[pinned], held])] = False
-        self.base = Base(closed, pinned, free, self.factor(free), np.zeros((0, p.b.size)))
+        known, none = np.zeros((0, p.b.size)), np.zeros_like(closed)
+        self.base = Base(closed, pinned, free, self.factor(free), known, none)
         self.factorizations += 1
         self._start(closed)
         return self.base
@@ -233,36 +273,34 @@ class BorderedSystems:
         p = self.program
         rows, at = self._changed(base, active, anchor)
         keys = np.concatenate([at, ~rows]).tolist()
-        if not keys:
-            V = np.zeros((0, 0))
-            return Border(base, active, anchor, at, rows, rows, rows, V, V.diagonal(), V)
-        columns = [_row(p.K, i) for i in at.tolist()]
-        if p.R is None:
-            columns += [(p.unknown[[j]], np.ones(1)) for j in rows]
-        else:
-            columns += [_row(p.R, j) for j in rows.tolist()]
-        new = [i for i, key in enumerate(keys) if key not in base.place]
-        base.place.update({keys[i]: len(base.place) + k for k, i in enumerate(new)})
-        V = np.zeros((len(new), p.b.size))
-        for right, i in zip(V, new, strict=True):
-            right[columns[i][0]] = columns[i][1]
-        base.known = np.vstack([base.known, *(self._back_solve(base, right) for right in V)])
-        column = np.array([base.place[key] for key in keys], dtype=np.intp)
-        indices, values = (np.concatenate(x) for x in zip(*columns, strict=True))
-        touched, place = np.unique(indices, return_inverse=True)  # few of the unknowns
-        dense, D = np.zeros((len(keys), len(touched))), np.zeros((len(keys), len(keys)))
-        dense[np.repeat(np.arange(len(keys)), [len(x) for x, _ in columns]), place] = values
-        D[:, : at.size] = dense[:, np.searchsorted(touched, at)]
-        D[: at.size] = D[:, : at.size].T
+        base.switched |= active ^ base.active
+        known = [base.known]
+        for key in [key for key in keys if key not in base.place]:
+            if key < 0 and p.R is None:
+                unknowns, values = p.unknown[[~key]], np.ones(1)
+            else:
+                unknowns, values = _row(p.K, key) if key >= 0 else _row(p.R, ~key)
+            base.place[key] = len(base.columns)
+            base.columns.append((unknowns, values))
+            right = np.zeros(p.b.size)
+            right[unknowns] = values
+            known.append(self._back_solve(base, right))
+            if key >= 0:
+                known[-1][key] -= 1.0
+        base.known = np.vstack(known)
+        place = [base.place[key] for key in keys]
+        columns = [base.columns[k] for k in place]
+        S = np.zeros((len(keys), len(keys)))
+        for row, (unknowns, values) in zip(S, columns, strict=True):
+            row[:] = (base.known[:, unknowns] @ values)[place]
         if anchor is not None:
             stiffness = anchor.stiffness[base.pinned & ~anchor.rigid]
             pins = np.arange(at.size - stiffness.size, at.size)
-            D[pins, pins] += stiffness
-        S = dense @ base.known[np.ix_(column, touched)].T - D
+            S[pins, pins] -= stiffness
         size = np.sqrt(np.abs(np.diagonal(S)))
         size = np.where(size > 0, size, 1.0)
         S /= np.outer(size, size)
-        return Border(base, active, anchor, at, rows, column, touched, dense, size, S)
+        return Border(base, active, anchor, at, rows, place, columns, size, S)
 
     def _correct(self, system: Border, residual: Array, tolerance: float) -> None:
         """Add the solution for a residual (n,), one back-solve unless it is small outside V."""
@@ -272,10 +310,12 @@ class BorderedSystems:
             x = self._back_solve(base, residual)  # step 1
         below = np.concatenate([residual[at], (p.g - p.left_sides(self.y))[rows]])
         if below.size:
-            right = (system.V @ x[system.touched] - below) / system.size
-            z = np.linalg.lstsq(system.S, right, rcond=BORDER_ROUND_OFF)[0] / system.size  # step 2
-            x -= z @ base.known[system.column]  # step 3
-            x[at] += z[: at.size]
+            across = [values @ x[unknowns] for unknowns, values in system.columns]
+            z = (
+                np.linalg.lstsq(system.S, (across - below) / system.size, rcond=BORDER_ROUND_OFF)[0]
+                / system.size
+            )  # step 2
+            x -= z @ base.known[system.place]  # step 3
             self.force[rows] += z[at.size :]
         self.y += x
         if p.R is None:

@@ -100,9 +100,11 @@ def same(one: Iterate, other: Iterate) -> None:
     np.testing.assert_allclose(one.force, other.force, rtol=0, atol=1e-10 * other.force.max())
 
 
-@pytest.mark.parametrize(("limit", "value"), [("MOST_CYCLES", 1), ("RESTARTS", 0)])
+@pytest.mark.parametrize(
+    ("limit", "value"), [("MOST_CYCLES", 1), ("MOST_STEPS", 1), ("RESTARTS", 0)]
+)
 def test_systems_that_stall_are_factorised(caplog, monkeypatch, limit: str, value: int):
-    """In a Newton step, and in the last refinement."""
+    """In a Newton step, after many of them, and in the last refinement."""
     monkeypatch.setattr(iterative, limit, value)
     scene = Scene("disc", 1, 3)
     with caplog.at_level(logging.INFO, logger="ngcontact"):

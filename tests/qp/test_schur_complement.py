@@ -90,3 +90,16 @@ def test_systems_may_be_refined_in_any_order():
             # Condition of the matrix up to 1e4, entries of size 1.
             np.testing.assert_allclose(found, right, rtol=0, atol=1e-11)
         systems.solve(one)
+
+
+def test_the_dense_program_of_all_rows_is_the_whole():
+    """From any active set, with more back-solves than a factorisation costs."""
+    rng = np.random.default_rng(3)
+    for seed in range(50):
+        program = random_bounds(seed)
+        systems = BorderedSystems(program, counting_factor(program.K, []), border=0)
+        systems.solve(rng.random(6) < 0.5)
+        active = systems.complementary(np.ones(6, dtype=bool))
+        np.testing.assert_array_equal(active, minimise(systems).active)
+        systems.solve(active)
+        assert systems.factorizations == 1
