@@ -42,6 +42,19 @@ def test_levels_of_exact_solutions(name, order, unknowns):
 
 
 @pytest.mark.study
+def test_punch_regains_the_rate():
+    """Corner r^(-1/2): N^-1/4 uniformly, N^-1/2 adaptively, both of order 1."""
+    study = STUDIES["flat punch"]()
+    errors = energy_errors(study, reference=15_000)
+    rates = {}
+    for strategy in ("uniform", "adaptive"):
+        levels = run_of("flat punch", study, strategy, 1, errors, max_dofs=10_000)
+        rates[strategy] = rate([row for _, row in levels])
+    assert abs(rates["uniform"] + 0.25) < 0.05
+    assert abs(rates["adaptive"] + 0.5) < 0.075
+
+
+@pytest.mark.study
 def test_bounds_are_measured_and_drawn(tmp_path, capsys):
     rows = bounds.main(["one transition"], orders=[2], max_dofs=1500, out=tmp_path)
     said = capsys.readouterr().out.splitlines()
