@@ -150,13 +150,18 @@ class ActiveSetIteration:
             switched = self.systems.complementary if small else self.active.__xor__
             self.active = switched(wrong)  # (ii)
             if (key := self.active.tobytes()) in seen:  # by a cycle, or by round-off
+                if small and tie == WIDEST_TIE:  # a motion is hardly resisted: see the caller
+                    break
                 tie = min(10 * tie, WIDEST_TIE)
             seen.add(key)
             if (idle := self.idle(anchor)) is None:
                 return anchor, False
             anchor = prescribing(idle, anchor)
+        held = 0 if anchor is None else np.count_nonzero(anchor.stiffness)
+        if held < self.systems.program.null_space.pins.size:
+            return anchor, False
         raise ConvergenceError(
-            f"the active set did not settle in {limit} Newton steps ({count} "
+            f"the active set did not settle in {len(self.steps)} Newton steps ({count} "
             "rows still change); check that the matrix is symmetric and positive definite",
             iterate=self.result(),
         )
