@@ -175,7 +175,7 @@ def dual_program(
     unknown, null_space = _joined(firsts, np.intp), no_null_space(d)
     R, T = _basis(mu, lines, unknown)
     other = abs(T - sp.eye_array(d)).sum(axis=1) > 0
-    parts = [part for e in elements for part in _of_unknowns(e, T, other)]
+    parts = (part for e in elements for part in _of_unknowns(e, T, other))
     K = shared(assembled([(at, N.transpose(0, 2, 1) @ N) for at, N in parts], d))
     size = K.diagonal()
     K.setdiag((1 + DIAGONAL_SHIFT) * size)
