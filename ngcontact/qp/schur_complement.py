@@ -175,7 +175,8 @@ class BorderedSystems:
         """Active set (m,) that is right for the rows `wrong` (m,) and all that switched before.
 
         The other rows keep their state in the base. With the Schur complement C of these rows their
-        slacks t minimise 1/2 t'C t + c't, t >= 0: a problem of nonnegative least squares.
+        slacks t minimise 1/2 t'C t + c't, t >= 0: a problem of nonnegative least squares. Where
+        that does not end, all `wrong` rows switch.
         """
         p, system = self.program, self.system
         assert system is not None
@@ -200,7 +201,10 @@ class BorderedSystems:
         c = N @ np.where(at, -w, slack * size) + np.where(at, force * size, w)
         values, vectors = np.linalg.eigh((N * np.where(at, 1.0, -1.0))[free][:, free])
         root = np.sqrt(np.maximum(values, BORDER_ROUND_OFF * values[-1]))
-        t, _ = nnls((vectors * root).T, -(vectors.T @ c[free]) / root)
+        try:
+            t, _ = nnls((vectors * root).T, -(vectors.T @ c[free]) / root)
+        except RuntimeError:  # after three steps for each row
+            return system.active ^ wrong
         active = system.active.copy()
         active[row[free]] = t == 0
         return active
