@@ -134,8 +134,9 @@ def fields(solution: Solved) -> dict[str, Field]:
     x, y, *z = coordinates(solution)
     normal = "zz" if x == "x" else "hoop"
     names = [f"{x}{x}", f"{y}{y}", f"{x}{y}", normal, "yz", "xz"][: 2 * solution.mesh.dim]
-    free = 0.0 if solution.stress_free else 1.0  # round-off has no colours
-    stress, move = free * full_stress(solution), ng.CF(tuple(solution.displacement))
+    stress, move = full_stress(solution), ng.CF(tuple(solution.displacement))
+    if solution.stress_free:
+        stress = 0.0 * stress  # round-off has no colours
 
     def component(number: int) -> Callable[[Array], Array]:
         return lambda values: np.asarray(values[:, number])
