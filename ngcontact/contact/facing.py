@@ -231,12 +231,13 @@ def _outlines(trace: BoundaryTrace, facing: Index) -> tuple[Array, Index]:
     _, at, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     off = np.abs(inner - chord).max(axis=(2, 3))
     bent = (count[at].reshape(-1, 3) == 1) & (off > SLIVER * np.abs(b - a).max(axis=(2, 3)))
-    points = np.concatenate([a, np.where(bent[..., None, None], inner, chord), b], axis=2)
+    points = np.concatenate([a, np.where(bent[..., None, None], inner, b), b], axis=2)
     middle = np.broadcast_to(x[:, None, None, :3].mean(axis=3), points[:, :, 1:].shape)
     some, whole = np.flatnonzero(bent.any(axis=1)), np.flatnonzero(~bent.any(axis=1))
     fans = np.stack([middle, points[:, :, :-1], points[:, :, 1:]], axis=3)[some]
-    number = np.repeat(some, 3 * RIM_PARTS)
-    return np.concatenate([x[whole, :3], fans.reshape(-1, 3, 3)]), np.append(whole, number)
+    used = bent[some][..., None] | (np.arange(RIM_PARTS) == 0)  # of straight edges one chord
+    number = np.repeat(some, used.sum(axis=(1, 2)))
+    return np.concatenate([x[whole, :3], fans[used]]), np.append(whole, number)
 
 
 def _seen(
