@@ -134,11 +134,8 @@ class Solved:
         d, space = self.discrete, self.discrete.space
         internal = space.A @ self.displacement.vec.FV().NumPy()
         residual = internal - space.condensed(space.right_side)
-        return (
-            (space.basis.T @ residual + d.rows.matrix.T @ self.force)
-            .reshape(self.problem.dim, -1)
-            .T
-        )
+        nodal = space.basis.T @ residual + d.rows.matrix.T @ self.force
+        return nodal.reshape(self.problem.dim, -1).T
 
     @cached_property
     def reactions(self) -> dict[str, Array]:

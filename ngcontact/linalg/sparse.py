@@ -78,7 +78,7 @@ def handed_over(K: sp.sparray) -> ng.BaseMatrix:
     memory = K.data
     while isinstance(memory, np.ndarray):
         memory = memory.base
-    if isinstance(memory, _View):
+    if isinstance(memory, _View) and (memory.owner.shape, memory.owner.nze) == (K.shape, K.nnz):
         return memory.owner
     return _from_entries(_rows(K), K.indices, K.data, K.shape)
 

@@ -74,14 +74,16 @@ def plot_convergence(
     named = {str(k): run for k, run in runs.items()} if isinstance(runs, Mapping) else {"": runs}
     if unknown := set(rates or {}) - set(named):
         raise ValueError(f"rates: no run is called {', '.join(sorted(unknown))}")
+    for label, run in named.items():
+        if len(run[0] if isinstance(run, tuple) else run) == 0:
+            raise ValueError(f'run "{label}" is empty')
     target = None if path is None else check_path(path, ".png")
     figure = new_figure(target, figsize=(6.5, 5))
     axes = figure.subplots()
     for k, (label, run) in enumerate(named.items()):
         levels = () if isinstance(run, tuple) else run
-        x, y = run if isinstance(run, tuple) else errors_of(levels, "relative_error_estimate")
-        if len(x) == 0:
-            raise ValueError(f'run "{label}" is empty')
+        pair = run if isinstance(run, tuple) else errors_of(levels, "relative_error_estimate")
+        x, y = (np.asarray(values, dtype=float) for values in pair)
         rate, name, (colour, mark) = (rates or {}).get(label), label, colour_and_mark(k)
         style: dict[str, Any] = {"color": colour, "marker": mark, "ms": 4}
         if levels:

@@ -311,10 +311,8 @@ def draw_scene(
     space = " " if width / height > 0.9 else "\n"
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
     _draw_windows(bodies, close, windows, style.unit("length")[1])
-    label, (_, unit) = (
-        style.title(scene.shown.label, scene.shown.kind),
-        style.unit(scene.shown.kind),
-    )
+    label, kind = scene.shown.label, scene.shown.kind
+    label, (_, unit) = style.title(label, kind), style.unit(kind)
     extremes = float(scene.values.min()) / unit, float(scene.values.max()) / unit
     colour_bar(figure, shading, [bodies, *close], label, extremes)
     if parts:
