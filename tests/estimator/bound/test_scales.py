@@ -1,4 +1,4 @@
-"""Directions of a law, and rings of large radius; units and motions are in test_scaling.py."""
+"""Directions of a law, and rings of large radius; units and motions: tests/test_similar.py."""
 
 from __future__ import annotations
 
