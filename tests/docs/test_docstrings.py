@@ -96,47 +96,28 @@ def test_arrays_have_shapes():
     assert not [what for what, holds in found if not holds]
 
 
-# What a docstring may call the unit of a quantity; "any consistent units" serves for all.
-UNITS = {
-    "length": r"(?:any consistent |in )?units? of length|\ba length\b",
-    "stress": r"units? of stress",
-    "force": r"(?:units? of )?force per (?:unit )?(?:thickness|length)",
-    "energy": r"(?:units? of )?energy(?:,)? per (?:unit )?thickness|\bper unit thickness\b",
-    "energy norm": r"root of (?:an )?energy(?: per (?:unit )?thickness)?",
-    "none": r"\bdimensionless\b",
-    "angle": r"\b(?:degrees|radians)\b",
-    "any": r"any consistent units?",
-}
-SOLUTION = {  # every attribute and method of `Solution` by the dimension of what it gives
-    "length": "displacement points gap transitions",
-    "stress": "stress out_of_plane_stress hoop_stress pressure pressure_field equilibrated",
-    "force": "force contact_force nodal_reaction reactions",
-    "energy": "energy estimate_parts bound_parts energy_bounds",
-    "energy norm": "energy_norm indicators error_estimate error_bound",
-    "none": "direction relative_error_estimate relative_error_bound residuals",
-    "any": "quantities contact_area at along record",
-}
-# ... and those that are no quantities: objects, names, numbers of things, truth values, files.
-PLAIN = """problem mesh order element discrete minimiser work coarse_levels tree adaptive pair
-active steps free_motions stress_free estimated bounded pairs write revolved plot draw save
-earlier"""
+# What a docstring may call the unit of a quantity.
+UNIT = re.compile(
+    r"units? of (length|stress|energy)|\ba length\b|\b(degrees|radians)\b|\bdimensionless\b"
+    r"|per (unit )?(thickness|length)|root of (an )?energy|any consistent unit"
+)
 
 
-def has_unit(text, *dimensions):
-    return any(re.search(UNITS[word], text) for word in (*dimensions, "any"))
+def members():
+    """Names and docstrings of what a `Solution` has that are numbers, arrays or fields."""
+    for name in (name for name in dir(Solution) if not name.startswith("_")):
+        member = inspect.getattr_static(Solution, name)
+        given = getattr(
+            getattr(member, "func", getattr(member, "fget", member)), "__annotations__", {}
+        )
+        if re.search("float|Array|Coefficient|GridFunction", str(given.get("return"))):
+            yield name, inspect.getdoc(member)
 
 
 def test_a_solution_says_its_units():
-    public = {name for name in dir(Solution) if not name.startswith("_")}
-    public |= Solution.__dataclass_fields__.keys()
-    assert public == {*" ".join(SOLUTION.values()).split(), *PLAIN.split()}
-    for dimension, names in SOLUTION.items():
-        for name in names.split():
-            member = inspect.getattr_static(Solution, name, None)
-            said = inspect.getdoc(getattr(member, "func", member)) or ""
-            if name in Solution.__dataclass_fields__:
-                said = entry(inspect.getdoc(Solution), name)
-            assert has_unit(said, dimension), name
+    said = dict(members()) | {"displacement": entry(inspect.getdoc(Solution), "displacement")}
+    assert len(said) > 20
+    assert not [name for name, text in said.items() if not UNIT.search(text)]
 
 
 @pytest.mark.parametrize("name", geometries.__all__)
@@ -148,5 +129,4 @@ def test_geometries_say_their_units(name):
     numbers = [parameter for parameter, kind in parameters if "float" in str(kind.annotation)]
     assert numbers
     if "Lengths are in any consistent unit" not in docstring:
-        kinds = ("length", "angle", "none")
-        assert not [n for n in numbers if not has_unit(entry(docstring, n), *kinds)]
+        assert not [n for n in numbers if not UNIT.search(entry(docstring, n))]

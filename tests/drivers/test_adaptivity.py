@@ -1,12 +1,8 @@
-"""What adaptivity and bounds must show, smaller versions of the drivers."""
-
-import csv
+"""What adaptivity must show, smaller versions of `drivers.adaptive_study`."""
 
 import numpy as np
 import pytest
 
-from drivers import bounds
-from drivers.adaptive_study.__main__ import main
 from drivers.adaptive_study.runs import STUDIES, energy_errors, rate, run_of
 
 # The error of the best marking, driven by the true error, at a number of unknowns, and by how much
@@ -52,36 +48,3 @@ def test_punch_regains_the_rate():
         rates[strategy] = rate([row for _, row in levels])
     assert abs(rates["uniform"] + 0.25) < 0.05
     assert abs(rates["adaptive"] + 0.5) < 0.075
-
-
-@pytest.mark.study
-def test_bounds_are_measured_and_drawn(tmp_path, capsys):
-    rows = bounds.main(["one transition"], orders=[2], max_dofs=1500, out=tmp_path)
-    said = capsys.readouterr().out.splitlines()
-    assert len(said) == 1 + len(rows)
-    for row in rows:
-        assert 1 <= row.bound <= 1.15 < 3 < row.estimate
-        assert 0 < row.width <= 1.5
-        assert min(row.run, row.bounding, row.quantities) > 0
-    with (tmp_path / "bounds.csv").open(encoding="utf-8") as file:
-        assert [int(row["unknowns"]) for row in csv.DictReader(file)] == [r.unknowns for r in rows]
-    assert (tmp_path / "bounds.png").read_bytes()[:4] == b"\x89PNG"
-
-
-@pytest.mark.study
-def test_driver_writes_rows_and_pictures(tmp_path):
-    sizes = {"max_dofs": 2000, "reference": 6000}
-    rows = main(["disc on rigid plane"], orders=(1, 2), **sizes, out=tmp_path)
-    assert max(row.unknowns for row in rows) <= 2000
-    with (tmp_path / "adaptive_study.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == len(rows) > 8
-    assert {row.strategy for row in rows} == {"uniform", "adaptive"}
-    assert {"errors_disc_on_rigid_plane.png", "meshes_disc_on_rigid_plane.png"} <= {
-        path.name for path in tmp_path.iterdir()
-    }
-    one, other = (
-        rate([row for row in rows if (row.strategy, row.order) == (strategy, 2)])
-        for strategy in ("uniform", "adaptive")
-    )
-    page = (tmp_path / "adaptive_study.md").read_text(encoding="utf-8")
-    assert f"| disc on rigid plane | 2 | {one:.2f} | {other:.2f} | -1.0 |" in page

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import ngcontact
-from drivers.benchmark.__main__ import main
 from drivers.benchmark.engines import NotInstalledError, Run, needed, ngsolve
 from drivers.benchmark.scenes.problems import block, disc
 from drivers.benchmark.studies import overhead, processes
@@ -69,16 +68,6 @@ def test_references_are_those_of_the_package(name: str):
 def test_small_problems_do_not_stay_iterative():
     with pytest.raises(RuntimeError, match="1000 unknowns did not stay iterative"):
         processes.measure("block", 1, 1000, "iterative")
-
-
-@pytest.mark.study
-def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    found = main(["tax"], problems=["block"], rounds=1, max_dofs=10_000, out=tmp_path)
-    assert len(found["tax"]) == 2 * 2  # orders, sizes
-    assert all(float(row[k]) > 0 for row in found["tax"] for k in ("linear, s", "cold", "warm"))
-    [path] = tmp_path.iterdir()
-    assert path.name == "benchmark_tax.md"
-    assert path.read_text() in capsys.readouterr().out
 
 
 def test_every_stage_of_a_level_is_found():

@@ -24,22 +24,6 @@ from drivers.tables import table
 
 ROOT = Path(__file__).parents[2]
 
-# What the help has to say of parameters of these names, in any driver: the unit, or what it is.
-UNITS = {
-    "radius": "m.",
-    "lower-radius": "m.",
-    "press": "radii",
-    **dict.fromkeys(("disc", "block", "upper", "lower"), "Pa"),
-    **dict.fromkeys(("order", "orders"), "1 to 4"),
-    "tolerance": "relative in the energy norm",
-    **dict.fromkeys(("max-dofs", "reference"), "nknowns"),
-    **dict.fromkeys(("solves", "processes", "levels", "seed", "rounds"), "umber of"),
-    "scenes": "How many",
-    "contrasts": "largest modulus over the smallest",
-    "out": "Folder",
-    "page": "File",
-}
-
 
 def main_of(name):
     module = importlib.import_module(f"drivers.{name}")
@@ -74,21 +58,15 @@ def test_every_part_can_be_asked_for(names, parts):
 
 @pytest.mark.parametrize("name", drivers())
 @pytest.mark.study(witness=["stress"])
-def test_help_states_units_and_defaults_and_runs_nothing(name, tmp_path):
+def test_help_describes_every_parameter_and_runs_nothing(name, tmp_path):
     wide = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "500"}
     command = [sys.executable, "-m", f"drivers.{name}", "--help"]
     done = subprocess.run(command, cwd=tmp_path, env=wide, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert inspect.getdoc(main_of(name)).partition("\n")[0] in done.stdout
     lines = [line for line in done.stdout.splitlines() if "--" in line]
-    parameters = inspect.signature(main_of(name)).parameters
-    assert len(lines) == len(parameters)
-    for option in (parameter.replace("_", "-") for parameter in parameters):
-        [line] = [line for line in lines if f"--{option} " in line]
-        described, default, _ = line.partition("[default: ")
-        assert default
-        assert UNITS.get(option, "") in described
-        assert re.search(r"[a-z]{3,} [\w,' ]+\.", described)  # a sentence from the docstring
+    for option in inspect.signature(main_of(name)).parameters:
+        [line] = [line for line in lines if f"--{option.replace('_', '-')} " in line]
+        assert re.search(r"[a-z]{3,} [\w,' ]+\..* \[default: ", line)  # a sentence of the docstring
     assert list(tmp_path.iterdir()) == []
 
 

@@ -2,7 +2,6 @@
 
 import pytest
 
-from drivers import convergence
 from drivers.convergence import PATCHES, TABLES, study
 from drivers.reference import cases, paper
 
@@ -100,20 +99,3 @@ def test_high_order_on_curved_full_contact(order, rate):
     assert rows[-1].rate >= rate
     assert rows[-1].rate > rows[-2].rate
     assert rows[-1].identities < IDENTITIES
-
-
-@pytest.mark.study
-def test_driver_prints_every_table(capsys):
-    """The tables of the driver, on first meshes only."""
-    found = convergence.main(levels=2)
-    printed = capsys.readouterr().out
-    for title, rows in found.items():
-        assert title in printed
-        assert len(rows) == (2 if "order 1" in title else 1)
-    assert set(PATCHES) <= set(found)
-    assert len(found) == len(PATCHES) + sum(len(table.runs) for table in TABLES.values())
-    assert "P2" in printed
-
-
-def test_driver_prints_the_parts_asked_for():
-    assert list(convergence.main(["patch"])) == list(PATCHES)

@@ -27,10 +27,3 @@ def test_computed_figures_are_the_published_ones(name, max_dofs):
     solution = driver.solved(PUBLISHED[name], 2, max_dofs)
     for figure, row in zip(figures, driver.rows_of(figures, solution), strict=True):
         assert abs(row[3]) <= figure.within
-
-
-def test_a_page_is_written(tmp_path):
-    driver.main(("patch test",), order=1, max_dofs=500, page=tmp_path / "page.md")
-    text = (tmp_path / "page.md").read_text()
-    assert "| mean pressure, Pa | 100000 | 100000 |" in text
-    assert PUBLISHED["patch test"].source in text
