@@ -1,14 +1,13 @@
 """Residual error indicators in the energy norm, with contact terms.
 
 For two bodies and one pressure pi_h, the discrete contact force over its weight (after Krause,
-Veeser, Walloth 2015, Numer. Math. 130:151). Squared contributions of an element T of diameter h,
-shear modulus mu, degree p:
+Veeser, Walloth 2015, Numer. Math. 130:151). Polynomials Pi sigma_h on the elements stand for
+sigma_h. Squared contributions of an element T of diameter h, shear modulus mu, degree p:
 
 * element: (h/p)^2 / 2mu |F + div sigma_h|^2 over T
 * jump: half of (h/p) / 2mu |[sigma_h n]|^2 over the edges inside a body
 * oscillation: |sigma_h - Pi sigma_h|^2 in the norm of C^-1 over T, where moduli or initial strains
-  vary; there
-  Pi sigma_h, polynomials, stands for sigma_h in the parts before
+  vary
 * traction: (h/p) / 2mu |P - sigma_h n|^2 over Gamma_tau and all free boundary
 * sliding: (h/p) / 2mu |sigma_t|^2 over Gamma_0
 * tangential, pressure: (h/p) / 2mu times the squares of the parts of the traction across and

@@ -89,7 +89,10 @@ class ScaledSolution:
     boundary: BoundaryTrace
     displacement: ng.GridFunction
     stress: ng.CoefficientFunction  # sigma_h (2, 2) over `unit`
-    projected: ng.GridFunction  # the same as (xx, yy, xy), polynomials on each element
+    # The same as (xx, yy, xy), polynomials on each element, which stand for it in all residuals:
+    # of nearly incompressible bodies sigma_h has kappa times what div u_h misses on curved elements
+    # between points of quadrature.
+    projected: ng.GridFunction
     unit: float
     modulus: float
     mu: Array  # (ne,), the smallest stiffness, see `fem.Moduli`
@@ -152,13 +155,22 @@ class ScaledSolution:
 
     def traction(self, segment: Index, s: Array) -> Array:
         """Traction sigma_h n (k, d) over `unit`, at points `s` (k, ...) of each `segment` (k,)."""
-        return self.boundary.traction(self.stress, segment, s)
+        return self.boundary.traction(tensor(self.projected), segment, s)
 
 
 def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
     """(xx, yy, xy) of a stress (2, 2), of a solid's (3, 3) also those with z, in Voigt's order."""
     rows = {4: (0, 3, 1), 9: (0, 4, 8, 5, 2, 1)}[stress.dim]
     return summing(stress.dim, *((row,) for row in rows)) * stress.Reshape((stress.dim,))
+
+
+def tensor(voigt: ng.CoefficientFunction) -> ng.CoefficientFunction:
+    """The stress (2, 2), of a solid (3, 3), of components in Voigt's order."""
+    if voigt.dim == 6:
+        xx, yy, zz, yz, xz, xy = voigt
+        return ng.CF((xx, xy, xz, xy, yy, yz, xz, yz, zz), dims=(3, 3))
+    xx, yy, xy = voigt
+    return ng.CF((xx, xy, xy, yy), dims=(2, 2))
 
 
 def oscillation(solution: ScaledSolution) -> Array:
@@ -177,16 +189,11 @@ def divergence_and_jump(
     stress: ng.GridFunction,
 ) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
     """Div sigma and [sigma n] of a projected stress, two of d components."""
-    miss = stress - stress.Other()
-    if stress.dim == 6:
-        xx, yy, zz, yz, xz, xy = miss
-        tensor, d = ng.CF((xx, xy, xz, xy, yy, yz, xz, yz, zz), dims=(3, 3)), 3
-        rows: tuple[tuple[int, ...], ...] = ((0, 16, 14), (15, 4, 11), (12, 10, 8))
-    else:
-        xx, yy, xy = miss
-        tensor, d, rows = ng.CF((xx, xy, xy, yy), dims=(2, 2)), 2, ((0, 5), (4, 3))
+    d = 2 if stress.dim == 3 else 3
+    plane, solid = ((0, 5), (4, 3)), ((0, 16, 14), (15, 4, 11), (12, 10, 8))
+    rows: tuple[tuple[int, ...], ...] = plane if d == 2 else solid
     divergence = summing(stress.dim * d, *rows) * ng.Grad(stress).Reshape((stress.dim * d,))
-    return divergence, tensor * ng.specialcf.normal(d)
+    return divergence, tensor(stress - stress.Other()) * ng.specialcf.normal(d)
 
 
 def element_integral(

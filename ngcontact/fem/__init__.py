@@ -22,7 +22,6 @@ from .moduli import moduli_of as moduli_of
 from .moduli import nearly_incompressible as nearly_incompressible
 from .moduli import rough_moduli as rough_moduli
 from .moduli import warn_of_jumps as warn_of_jumps
-from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble

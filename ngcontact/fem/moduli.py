@@ -21,8 +21,6 @@ from ..quadrature import SampledElements, features_of, lattice
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
-# ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
-LOCKING_RATIO = 11.0
 
 # Change of a law in an element over its least value there, of an initial strain over its largest in
 # the body, from which it is rough there, or jumps.
@@ -148,17 +146,6 @@ def nearly_incompressible(
     names = np.array(bodies)[MeshArrays(mesh).bodies]
     most = {name: float(ratio[names == name].max(initial=0.0)) for name in dict.fromkeys(bodies)}
     return {name: value for name, value in most.items() if value > limit}
-
-
-def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
-    """Warn of every body that elements of order 1 are too stiff for."""
-    if order > 1:
-        return
-    for name, ratio in nearly_incompressible(problem, mesh, LOCKING_RATIO).items():
-        warn(
-            f'body "{name}" is nearly incompressible, lambda / mu = {ratio - 1:.3g}: elements of '
-            "order 1 lock; use order=2 or higher"
-        )
 
 
 @dataclass(frozen=True, eq=False)

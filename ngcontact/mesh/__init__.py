@@ -12,6 +12,7 @@ from .curving import unresolved as unresolved
 from .curving import vertex_parents as vertex_parents
 from .faces import CadFace as CadFace
 from .faces import cad_faces as cad_faces
+from .faces import curved_facets as curved_facets
 from .faces import feet_on_faces as feet_on_faces
 from .files import read as read
 from .generation import first_mesh as first_mesh

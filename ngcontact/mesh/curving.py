@@ -113,12 +113,7 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
         if before > 1:
             mesh.Curve(before)
     degree = order if element == "isoparametric" else order + 1  # (2.8)
-    if mesh.dim == 3:
-        curved = curved_facets(mesh)
-    else:
-        bent = [k for k, edge in enumerate(cad_edges(mesh) or ()) if not edge.straight]
-        curved = np.isin(MeshArrays(mesh).boundaries, bent)
-    count = int(np.count_nonzero(curved))
+    count = int(np.count_nonzero(curved_facets(mesh)))
     if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count
     copy = copied(mesh)

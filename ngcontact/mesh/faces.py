@@ -16,6 +16,7 @@ from netgen.occ import OCCGeometry, TopoDS_Shape
 
 from ..arrays import NEWTON_STEPS, Array, Index, Mask
 from ..problem import MeshArrays
+from .cad import cad_edges
 
 # Step on the surface, relative to the coordinates, at which Newton has arrived.
 NEWTON_TOLERANCE = 1e-15
@@ -104,7 +105,10 @@ def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Arr
 
 
 def curved_facets(mesh: ng.Mesh) -> Mask:
-    """Facets (k,) of curved CAD faces."""
+    """Facets (k,) of curved CAD faces, in the plane of curved edges."""
+    if mesh.dim == 2:
+        bent = [k for k, edge in enumerate(cad_edges(mesh) or ()) if not edge.straight]
+        return np.isin(MeshArrays(mesh).boundaries, bent)
     curved = np.zeros(mesh.GetNE(ng.BND), dtype=bool)
     for _, at, _, plane in _by_face(mesh, np.arange(len(curved))):
         curved[at] = not plane

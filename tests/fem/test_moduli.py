@@ -1,14 +1,13 @@
-"""Moduli of elements, and the warning of locking."""
+"""Moduli of elements."""
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import ContactWarning, Elastic
-from ngcontact.fem.moduli import contact_modulus, moduli_of, warn_of_locking
+from ngcontact import Elastic
+from ngcontact.fem.moduli import contact_modulus, moduli_of
 from ngcontact.mesh import first_mesh
 
 BODIES = ("upper", "lower")
@@ -42,24 +41,3 @@ def test_contact_modulus_of_two_equal_bodies_and_of_one(mesh, model):
     modulus = 2.5 if model == "plane stress" else 2.5 / (1 - 0.3**2)
     assert contact_modulus(problem, mesh, side, none) == pytest.approx(modulus, rel=1e-12)
     assert contact_modulus(problem, mesh, side, side) == pytest.approx(modulus / 2, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("nu", "order", "model", "warned"),
-    [
-        (0.499, 1, "plane strain", True),
-        (0.46, 1, "plane strain", True),
-        (0.45, 1, "plane strain", False),
-        (0.499, 2, "plane strain", False),
-        (0.499, 1, "plane stress", False),
-    ],
-)
-def test_locking_is_not_silent(mesh, nu, order, model, warned):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        warn_of_locking(made_of(Elastic(E=1.0, nu=nu), model), mesh, order)
-    assert len(caught) == (2 if warned else 0)
-    for warning, body in zip(caught, BODIES, strict=False):
-        assert warning.category is ContactWarning
-        assert f'"{body}"' in str(warning.message)
-        assert "order=2" in str(warning.message)

@@ -1,4 +1,4 @@
-"""Supports that contradict each other at a corner, and estimates that rise: told, not followed."""
+"""Told before the solve or on the way: elements that lock, supports that contradict, estimates."""
 
 import math
 import warnings
@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from netgen.occ import Axis, OCCGeometry, Z
 
+from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.adaptivity import below_resolution
 from ngcontact.geometries import disc
 from ngcontact.mesh import first_mesh
-from ngcontact.plausibility import contradictions, estimates_rise
+from ngcontact.plausibility import contradictions, estimates_rise, warn_of_implausible
 from ngcontact.problem import MeshArrays
 from tests.quadrature.test_loads import loaded, square
 
@@ -102,3 +103,36 @@ def test_round_off_is_no_contradiction():
 @pytest.mark.parametrize("unit", [1.0, 1e-9])
 def test_rises_of_several_levels_are_found(estimates, rise, unit):
     assert estimates_rise([unit * estimate for estimate in estimates]) == rise
+
+
+def locking(problem, maxh, order):
+    """Bodies that warnings name."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        warn_of_implausible(problem, first_mesh(problem, maxh), order, [])
+    assert all(one.category is ContactWarning for one in caught)
+    assert all(f"order {order} lock" in str(one.message) for one in caught)
+    return [str(one.message).split('"')[1] for one in caught]
+
+
+@pytest.mark.parametrize(
+    ("nu", "order", "model", "warned"),
+    [
+        (0.499, 1, "plane strain", True),
+        (0.46, 1, "plane strain", True),
+        (0.45, 1, "plane strain", False),
+        (0.499999, 2, "plane strain", False),  # straight sides
+        (0.499, 1, "plane stress", False),
+    ],
+)
+def test_locking_is_not_silent(nu, order, model, warned):
+    law = {"upper|lower": Elastic(E=1.0, nu=nu)}
+    problem = replace(cases.one_transition().problem, materials=law, model=model)
+    assert locking(problem, 0.7, order) == ["upper", "lower"] * warned
+
+
+@pytest.mark.parametrize(("nu", "highest"), [(0.499, 1), (0.4999, 2), (0.499999, 3)])
+def test_higher_orders_lock_beside_curves(nu, highest):
+    problem = replace(cases.pressed_disc(), materials={"disc|block": Elastic(E=1.0, nu=nu)})
+    for order in (2, 3, 4):
+        assert locking(problem, 0.5, order) == ["disc"] * (order <= highest)
