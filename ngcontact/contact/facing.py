@@ -171,13 +171,25 @@ def divided(
     facing: Index,
     reach: Array | None = None,
 ) -> FacingPieces:
-    """Parts of `segments` (k,) that face one of the segments `facing` (q,) of the primary each.
+    """Parts of `segments` (k,), which rise, that face one of `facing` (q,), all of the primary.
 
     Facets without a direction look along the normals in their middles, no further away than
     `reach` (k,), which is left out with one.
     """
     if trace.model.dim == 3:
         return _clipped(trace, contact, segments, facing, reach)
+    pair = contact.secondary, contact.primary, contact.direction
+    if pair not in trace.pieces or not np.isin(segments, trace.pieces[pair][0]).all():
+        trace.pieces[pair] = segments, _passed(trace, contact, segments, facing)
+    known, pieces = trace.pieces[pair]
+    number = np.full(len(known), -1)
+    number[np.searchsorted(known, segments)] = np.arange(len(segments))
+    local = number[pieces.local]
+    return replace(rows_of(pieces, local >= 0), local=local[local >= 0])
+
+
+def _passed(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> FacingPieces:
+    """Pieces of `segments` (k,) between the vertices that they pass, as of `divided`."""
     k, ends = len(segments), trace.nodes[facing][:, trace.corners]
     _, first = np.unique(ends, return_index=True)
     x = trace.curve[facing][:, [0, -1]].reshape(-1, 2)[first]

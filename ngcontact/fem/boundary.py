@@ -167,6 +167,7 @@ class BoundaryTrace:
     bernstein: Mask  # (n,), nodes whose unknown is a Bernstein coefficient, of solids
     _guides: dict[str, tuple[Index, Array]] = field(default_factory=dict, init=False)
     _masks: dict[str, Mask] = field(default_factory=dict, init=False)
+    pieces: dict[Any, Any] = field(default_factory=dict, init=False)  # that `divided` has found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from the mesh: lines of a drawing cannot be pickled."""
