@@ -141,17 +141,19 @@ def rotations(x: Array) -> Array:
 
 
 def newton(
-    t: Array, step: Callable[[Array], Array], ends: tuple[float, float], rest: float
+    t: Array, step: Callable[[Array, Index], Array], ends: tuple[float, float], rest: float
 ) -> Array:
-    """Parameters (k,), from `t` (k,), after t - step(t) was taken again and again.
+    """Parameters (k,), from `t` (k,), after each has taken t - step(t, number) again and again.
 
-    Kept between both `ends`, until no change is larger than `rest`.
+    Kept between both `ends`, until its change is no larger than `rest`. `step` answers for some of
+    them, (j,), with their numbers (j,): few are left once most have arrived.
     """
+    t, moving = t.copy(), np.arange(len(t))
     for _ in range(NEWTON_STEPS):
-        new = np.clip(t - step(t), *ends)
-        moved = np.abs(new - t).max(initial=0.0)
-        t = new
-        if moved <= rest:
+        old = t[moving]
+        t[moving] = np.clip(old - step(old, moving), *ends)
+        moving = moving[np.abs(t[moving] - old) > rest]
+        if not moving.size:
             break
     return t
 

@@ -101,13 +101,24 @@ def zeros(order: int, values: Array) -> tuple[Index, Array]:
 
     Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points.
     """
-    number, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
-    for k, c in enumerate((_coefficients(order) @ values.T).T):
-        roots = legendre.legroots(legendre.legtrim(c, COEFFICIENT_ROUND_OFF * np.abs(c).max()))
-        s = (1 + roots[np.isreal(roots)].real) / 2
-        places.append(np.sort(np.clip(s, 0, 1)[np.abs(s - 0.5) <= 0.5 + END_ROUND_OFF]))
-        number.append(np.full(len(places[-1]), k))
-    return np.concatenate(number), np.concatenate(places)
+    number, places = list[Index](), list[Array]()
+    coefficients = values @ _coefficients(order).T
+    size = np.abs(coefficients)
+    large = size > COEFFICIENT_ROUND_OFF * size.max(axis=1, keepdims=True)
+    degree = (large * np.arange(order + 1)).max(axis=1)
+    for n in range(1, order + 1):  # eigenvalues of companion matrices
+        some = np.flatnonzero(degree == n)
+        companion = np.tile(legendre.legcompanion(np.eye(n + 1)[n]), (len(some), 1, 1))
+        scale = np.sqrt((2 * n - 1) / (2 * np.arange(n) + 1)) * n / (2 * n - 1)
+        companion[:, :, -1] -= coefficients[some, :n] / coefficients[some, n : n + 1] * scale
+        roots = np.linalg.eigvals(companion[:, ::-1, ::-1])
+        s = (1 + roots.real) / 2
+        inside = np.isreal(roots) & (np.abs(s - 0.5) <= 0.5 + END_ROUND_OFF)
+        number.append(some[inside.nonzero()[0]])
+        places.append(np.clip(s[inside], 0, 1))
+    found, s = np.concatenate(number), np.concatenate(places)
+    rising = np.lexsort((s, found))
+    return found[rising], s[rising]
 
 
 @lru_cache

@@ -115,11 +115,13 @@ def crossings(
     By Newton's method from `s` (k,) on `segment` (k,) of `curve` (q, p + 1, 2), until no step is
     larger than `settled`.
     """
+    degree = curve.shape[1] - 1
+    height = np.einsum("kid,kd->ki", curve[segment] - points[:, None], normal)
 
-    def step(s: Array) -> Array:
+    def step(s: Array, number: Index) -> Array:
         # (2.10): A_j and B_j on one perpendicular
-        miss = ((at(curve, segment, s) - points) * normal).sum(axis=1)
-        rate = (slope(curve, segment, s) * normal).sum(axis=1)
+        miss = (lagrange(degree, s) * height[number]).sum(axis=1)
+        rate = (lagrange_derivative(degree, s) * height[number]).sum(axis=1)
         return np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0)
 
     return newton(s, step, (0, 1), settled)
@@ -205,10 +207,11 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
         found.append(np.stack([point[passed], segment[passed]]))
     point, segment = np.concatenate(found, axis=1)
 
-    def step(s: Array) -> Array:
-        apart, v = points[point] - at(curve, segment, s), at(velocity, segment, s)
+    def step(s: Array, number: Index) -> Array:
+        here = segment[number]
+        apart, v = points[point[number]] - at(curve, here, s), at(velocity, here, s)
         square = (v**2).sum(axis=1)
-        rate = square - (apart * slope(velocity, segment, s)).sum(axis=1)
+        rate = square - (apart * slope(velocity, here, s)).sum(axis=1)
         # Gauss's and Newton's where that of Newton leads to a farthest point.
         return -(apart * v).sum(axis=1) / np.where(rate > 0, rate, square)
 

@@ -13,14 +13,14 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
 
-from ..arrays import Array, across, newton, rightward
+from ..arrays import Array, Index, across, newton, rightward
 
 SAMPLES = 65  # points of an edge from which a projection starts
 LEVEL_DISTANCE = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
 STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
 # Distance, relative to coordinates and axes, up to which a formula is its curve: their round-off.
 FORMULA_DISTANCE = 8 * np.finfo(float).eps
-NEWTON_TOLERANCE = 1e-15  # relative change of a parameter at which Newton's method has arrived
+NEWTON_TOLERANCE = 1e-12  # relative change of a parameter from which the next is round-off
 
 
 class CadEdge:
@@ -72,7 +72,7 @@ class CadEdge:
         values = (self._edge.Tangent(float(ti)) for ti in t)
         return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
 
-    def _newton(self, t: Array, step: Callable[[Array], Array]) -> Array:
+    def _newton(self, t: Array, step: Callable[[Array, Index], Array]) -> Array:
         """Parameters (k,) after t - step(t), kept inside the interval, stands still."""
         rest = NEWTON_TOLERANCE * abs(self.stop - self.start)
         return newton(t, step, (self.start, self.stop), rest)
@@ -89,9 +89,9 @@ class CadEdge:
             return np.minimum(np.maximum(self._middle + s, self.start), self.stop)
         nearest = ((points[:, None] - self.samples) ** 2).sum(axis=2).argmin(axis=1)
 
-        def step(t: Array) -> Array:
+        def step(t: Array, at: Index) -> Array:
             tangent = self.derivative(t)
-            return ((self.point(t) - points) * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
+            return ((self.point(t) - points[at]) * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
 
         t = self._newton(self._t[nearest], step)
         if self.closed and (at_seam := np.isin(nearest, (0, SAMPLES - 1))).any():
@@ -111,16 +111,15 @@ class CadEdge:
         Of several such points the one Newton's method reaches from the projections of the points
         `near` (k, 2); NaN where it reaches none.
         """
+        axes = np.broadcast_to(axis, near.shape)
 
-        def along(vectors: Array) -> Array:
-            return vectors @ axis if axis.ndim == 1 else (vectors * axis).sum(axis=1)
-
-        def step(t: Array) -> Array:
-            slope = along(self.derivative(t))
-            return (along(self.point(t)) - values) / np.where(slope == 0, np.inf, slope)
+        def step(t: Array, at: Index) -> Array:
+            slope = (self.derivative(t) * axes[at]).sum(axis=1)
+            off = (self.point(t) * axes[at]).sum(axis=1) - values[at]
+            return off / np.where(slope == 0, np.inf, slope)
 
         t = self._newton(self.project(near), step)
-        missed = np.abs(along(self.point(t)) - values) > LEVEL_DISTANCE * self.size
+        missed = np.abs((self.point(t) * axes).sum(axis=1) - values) > LEVEL_DISTANCE * self.size
         return np.where(missed, np.nan, t)
 
 

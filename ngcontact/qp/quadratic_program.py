@@ -141,12 +141,15 @@ def separated(vectors: Array, places: Index) -> Index:
 
     One after the other where most is left beside those before, as in a pivoted QR factorisation.
     """
-    left, found = vectors[places], []
-    for _ in range(min(vectors.shape[1], places.size)):
-        pivot = int((left * left).sum(axis=1).argmax())
+    some, found, q = vectors[places], [], vectors.shape[1]
+    left, rest = np.einsum("ki,ki->k", some, some), np.eye(q)  # squares, projection beside those
+    for _ in range(min(q, places.size)):
+        pivot = int(left.argmax())
         found.append(places[pivot])
-        along = left[pivot] / np.linalg.norm(left[pivot])
-        left = left - np.outer(left @ along, along)
+        along = rest @ some[pivot]
+        along /= np.linalg.norm(along)
+        rest -= np.outer(along, along)
+        left -= (some @ along) ** 2
     return np.array(found, dtype=np.intp)
 
 
