@@ -14,7 +14,7 @@ from ngcontact import plot_convergence, write_film
 from ngcontact.fem import von_mises
 from ngcontact.output import slope_triangle
 from ngcontact.output.files import check_path, replacing
-from tests.output.stubs import stub
+from tests.output.solutions import disc
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
@@ -55,7 +55,7 @@ def test_bad_paths_are_refused(tmp_path, name, error, message):
 def test_the_last_frame_is_seen_three_times_as_long(tmp_path, monkeypatch):
     images = [Image.new("L", (8, 8), grey) for grey in (0, 100, 200)]
     monkeypatch.setattr("ngcontact.output.pictures._images", lambda *_: images)
-    path, times = write_film(tmp_path / "a.gif", [stub(1)] * 3, seconds=0.25), []
+    path, times = write_film(tmp_path / "a.gif", [disc()] * 3, seconds=0.25), []
     with Image.open(path) as film:
         for k in range(film.n_frames):
             film.seek(k)

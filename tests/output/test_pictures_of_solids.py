@@ -9,7 +9,7 @@ from netgen.occ import Box, Compound, OCCGeometry, X, Z
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solids, write_film
 from ngcontact.output.surface import contact_surface
-from tests.output.test_solids import PRESSURE, pressed_ball, pressed_cube
+from tests.output.solutions import PRESSURE, pressed_ball, pressed_cube
 
 
 @pytest.fixture(scope="module")

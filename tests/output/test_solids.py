@@ -1,32 +1,16 @@
 """Files of solids: curved tetrahedra, contact points and the triangles between them, series."""
 
-from functools import lru_cache
-
 import ngsolve as ng
 import numpy as np
 import pytest
 import pyvista
 
-from ngcontact import Elastic, solve
+from ngcontact import solve
 from ngcontact.geometries import shells
 from ngcontact.output.nodes import nodes_of
 from ngcontact.output.surface import contact_surface
 from tests import scenes
-
-PRESSURE = 0.1
-
-
-@lru_cache
-def pressed_cube(order):
-    """A column under uniform pressure: stress zz alone, as nu = 0; contact everywhere."""
-    law = {"cube|block": Elastic(E=1.0, nu=0.0)}
-    problem = scenes.pressed_cube(materials=law, traction={"cube_top": PRESSURE})
-    return solve(problem, maxh=0.7, order=order)
-
-
-@lru_cache
-def pressed_ball(order=2):
-    return solve(scenes.pressed_ball(0.1), maxh=0.4, order=order)
+from tests.output.solutions import PRESSURE, pressed_ball, pressed_cube
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

@@ -7,27 +7,32 @@ import ngsolve as ng
 import numpy as np
 import pytest
 import pyvista
-from netgen.occ import Compound, Glue
-from ngsolve.meshes import MakeStructured2DMesh
+from netgen.occ import Compound, Glue, OCCGeometry
 from vtkmodules import vtkIOXML
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
-from drivers.reference import axisymmetric_cases as cases
-from ngcontact import solve
+from drivers.reference import axisymmetric_cases, cases
+from ngcontact import Elastic, Problem, solve
 from ngcontact.output import write_series, write_solution
-from tests.output.stubs import MAXH, stub, two_bodies
+from tests.output.solutions import disc
+from tests.scenes import rectangle
+
+MAXH = 0.4
 
 
 def written(folder, solution):
     return pyvista.read(write_solution(folder / "bodies.vtu", solution))
 
 
-@pytest.mark.parametrize(("order", "curve"), [(1, 1), (1, 2), (2, 2), (3, 3), (2, 4), (5, 5)])
-def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, curve):
-    solution = stub(order, curve=curve)
+@pytest.mark.parametrize(
+    ("order", "element"),
+    [*((p, "isoparametric") for p in (1, 2, 3, 4)), *((p, "superparametric") for p in (1, 2))],
+)
+def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, element):
+    solution = solve(cases.pressed_disc(), maxh=MAXH, order=order, element=element)
     mesh = solution.mesh
     grid = written(tmp_path, solution)
-    p = max(order, curve)
+    p = mesh.GetCurveOrder()
     inside = (p - 1) * (p - 2) // 2
     assert grid.n_cells == mesh.ne
     assert set(grid.celltypes) == {{1: 5, 2: 22}.get(p, 69)}
@@ -35,75 +40,80 @@ def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, curve):
     # have vertices of their own.
     assert grid.n_points == mesh.nv + mesh.nedge * (p - 1) + mesh.ne * inside
     exact = ng.Integrate(ng.CF(1.0), mesh, order=2 * p)
-    # The order of the geometry, h^(curve + 1); measured: at most 0.8 of this.
-    assert abs(exact - np.pi / 2 - 4) < (0.05 if curve == 1 else MAXH ** (curve + 1) / 200)
+    # The order of the geometry, h^(p + 1); measured: at most 0.8 of this.
+    assert abs(exact - np.pi / 4 - 4) < (0.05 if p == 1 else MAXH ** (p + 1) / 200)
     # VTK cuts every side into 2^3 chords at least; a chord s of the circle misses s^3 / 12, all of
-    # them less than pi s^2 / 12. Folded cells would count too much.
+    # them less than pi s^2 / 24. Folded cells would count too much.
     surface = vtkDataSetSurfaceFilter()
     surface.SetInputData(grid)
     surface.SetNonlinearSubdivisionLevel(3)
     surface.Update()
-    chords = np.pi * (MAXH / 8) ** 2 / 12 if p > 1 else 0.0
+    chords = np.pi * (MAXH / 8) ** 2 / 24 if p > 1 else 0.0
     assert pyvista.wrap(surface.GetOutput()).area == pytest.approx(exact, abs=chords + 1e-12)
 
 
 def test_fields_are_those_of_the_solution_at_the_nodes(tmp_path):
-    solution = stub(3)
+    """Of a pressure that is linear along the line: elements of order 2 contain the solution."""
+    case = cases.pressure_patch(p1=0.5)
+    solution = solve(case.problem, maxh=0.5, order=2)
     grid = written(tmp_path, solution)
-    x, y, z = grid.points.T
-    assert np.all(z == 0)
-    assert grid["displacement"].shape == grid.points.shape
-    np.testing.assert_allclose(grid["stress"][:, :3], np.stack([x, x * y, y], axis=1), atol=1e-12)
-    xx, yy, xy, zz = grid["stress"].T
-    np.testing.assert_allclose(zz, 0.25 * (xx + yy), atol=1e-12)  # plane strain
-    invariant = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2 + 6 * xy**2
-    np.testing.assert_allclose(grid["von_mises"], np.sqrt(invariant / 2), atol=1e-12)
-    # The displacement is not a formula on curved elements; NGSolve's point search, away from the
-    # touching line, gives it independently; measured: equal to 1e-16.
-    for k in np.flatnonzero((np.hypot(x, y - 1) < 0.9) | ((y < -0.1) & (y > -0.9)))[::7]:
-        expected = solution.displacement(solution.mesh(x[k], y[k]))
-        np.testing.assert_allclose(grid["displacement"][k], [*expected, 0], atol=1e-13)
+    nodes, names = grid.cells.reshape(-1, 7)[:, 1:], list(grid.field_data["body_names"])
+    for name, law in cases.BLOCKS.items():
+        own = np.unique(nodes[grid["body"] == names.index(name)])
+        x, y, z = grid.points[own].T
+        exact = [case.exact.displacement[name](solution.mesh(*at)) for at in zip(x, y, strict=True)]
+        assert not z.any()
+        np.testing.assert_allclose(grid["displacement"][own], np.c_[exact, z], atol=1e-12)
+        p = 1 + 0.5 * x
+        np.testing.assert_allclose(
+            grid["stress"][own], np.stack([z, -p, z, -law.nu * p], axis=1), atol=1e-12
+        )
+        mises = p * np.sqrt(1 - law.nu + law.nu**2)
+        np.testing.assert_allclose(grid["von_mises"][own], mises, rtol=1e-11)
     array = grid.GetPointData().GetAbstractArray("stress")
     assert [array.GetComponentName(k) for k in range(4)] == ["xx", "yy", "xy", "zz"]
 
 
 @pytest.mark.parametrize("glue", [Compound, Glue])
 def test_bodies_keep_their_own_stress_where_they_touch(tmp_path, glue):
-    mesh = ng.Mesh(two_bodies(glue).GenerateMesh(maxh=MAXH))
-    level = mesh.MaterialCF({"disc": 1.0, "block": 2.0})
-    grid = written(tmp_path, stub(2, ng.CF((level, 0, 0, 0), dims=(2, 2)), mesh=mesh))
+    """Stretched alike along their common side, with nu = 0."""
+    bodies = (rectangle(f"body{k}", (0, 1), (k, k + 1), "side") for k in (0, 1))
+    problem = Problem(
+        geometry=OCCGeometry(glue(list(bodies)), dim=2),
+        materials={"body0": Elastic(1.0, 0.0), "body1": Elastic(2.0, 0.0)},
+        displacement={"side": (0.01 * ng.x, 0)},
+    )
+    grid = written(tmp_path, solve(problem, maxh=MAXH, order=2))
     names = list(grid.field_data["body_names"])
-    assert sorted(names) == ["block", "disc"]
-    nodes = grid.cells.reshape(-1, 7)[:, 1:]
-    stress = grid["stress"][:, 0][nodes]
-    expected = np.where(grid["body"] == names.index("disc"), 1.0, 2.0)
-    np.testing.assert_allclose(stress, expected[:, None] + np.zeros_like(stress), rtol=1e-14)
+    assert sorted(names) == ["body0", "body1"]
+    stress = grid["stress"][:, 0][grid.cells.reshape(-1, 7)[:, 1:]]
+    expected = np.where(grid["body"] == names.index("body0"), 0.01, 0.02)
+    np.testing.assert_allclose(stress, expected[:, None] + np.zeros_like(stress), rtol=1e-11)
 
 
 def test_contact_points_carry_their_values(tmp_path):
-    solution = stub(2)
+    solution = disc()
     assert write_solution(tmp_path / "a.b.vtu", solution) == tmp_path / "a.b.vtu"
     data = pyvista.read(tmp_path / "a.b_contact.vtp")
     np.testing.assert_array_equal(data.points[:, :2], solution.points)
     for name in ("pressure", "gap", "force", "active", "pair"):
         np.testing.assert_array_equal(data[name], getattr(solution, name))
-    # The circle's middle is (0, 1): pressures pull its points towards it.
-    inwards = ((0.0, 1.0) - solution.points) * solution.pressure[:, None]
-    np.testing.assert_allclose(data["traction"][:, :2], inwards, atol=1e-15)
-    assert not data["traction"][:, 2].any()
+    upwards = np.outer(solution.pressure, (0, 1, 0))  # against the direction, on the disc
+    np.testing.assert_allclose(data["traction"], upwards, atol=1e-15 * upwards.max())
     for file in (data, pyvista.read(tmp_path / "a.b.vtu")):
         assert list(file.field_data["pair_names"]) == ["disc_arc with block_top"]
         assert list(file.field_data["secondary_names"]) == ["disc_arc"]
         assert list(file.field_data["primary_names"]) == ["block_top"]
     assert np.issubdtype(data["active"].dtype, np.integer)
-    assert data.n_verts == 9
+    assert data.n_verts == len(solution.points)
+    along = np.argsort(solution.points[:, 0])
     links = np.sort(data.lines.reshape(-1, 3)[:, 1:], axis=1)
-    assert sorted(links.tolist()) == [[k, k + 1] for k in range(8)]
+    assert sorted(links.tolist()) == sorted(np.sort(np.c_[along[:-1], along[1:]]).tolist())
 
 
 def test_series_lists_levels_with_both_files_also_where_it_is_interrupted(tmp_path):
     def levels():
-        yield from map(stub, (1, 2))
+        yield from map(disc, (1, 2))
         raise KeyboardInterrupt
 
     path = tmp_path / "run & more.pvd"
@@ -120,8 +130,8 @@ def test_series_lists_levels_with_both_files_also_where_it_is_interrupted(tmp_pa
     }
     reader.set_active_time_value(1.0)
     bodies, contact = reader.read()
-    assert bodies.n_cells == stub(2).mesh.ne
-    assert contact.n_points == 9
+    assert bodies.n_cells == disc(2).mesh.ne
+    assert contact.n_points == len(disc(2).points)
 
 
 @pytest.mark.parametrize(
@@ -136,33 +146,26 @@ def test_series_lists_levels_with_both_files_also_where_it_is_interrupted(tmp_pa
 )
 def test_times_that_do_not_fit_are_refused(tmp_path, times, error, message):
     with pytest.raises(error, match=message):
-        write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=times)
+        write_series(tmp_path / "run.pvd", [disc(1), disc(1)], times=times)
 
 
 def test_indicators_are_written_only_if_known(tmp_path):
-    solution = stub(2)
+    solution = solve(cases.pressed_disc(), maxh=1.0)
     assert "indicators" not in written(tmp_path, solution).cell_data
-    solution.estimated = True
-    np.testing.assert_array_equal(written(tmp_path, solution)["indicators"], solution.indicators)
+    indicators = solution.indicators
+    np.testing.assert_array_equal(written(tmp_path, solution)["indicators"], indicators)
 
 
 def test_empty_series_is_refused(tmp_path):
-    with pytest.raises(TypeError, match="solutions is a Stub: give a list"):
-        write_series(tmp_path / "run.pvd", stub(1))
+    with pytest.raises(TypeError, match="solutions is a Solution: give a list"):
+        write_series(tmp_path / "run.pvd", disc(1))
     with pytest.raises(ValueError, match="the series is empty"):
         write_series(tmp_path / "run.pvd", [])
     assert list(tmp_path.iterdir()) == []
 
 
-def test_quadrilaterals_are_refused(tmp_path):
-    solution = stub(1, mesh=MakeStructured2DMesh(quads=True, nx=2, ny=2))
-    with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
-        write_solution(tmp_path / "a.vtu", solution)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_hoop_stress_is_in_the_file(tmp_path):
-    problem, exact = cases.fitted_rings()
+    problem, exact = axisymmetric_cases.fitted_rings()
     solution = solve(problem, maxh=0.2, order=3)
     grid = pyvista.read(solution.write(tmp_path / "fit.vtu"))
     r = grid.points[:, 0]
@@ -174,7 +177,7 @@ def test_hoop_stress_is_in_the_file(tmp_path):
 
 @pytest.fixture(scope="module")
 def pressed():
-    return solve(cases.pressed_cylinders(0.5), maxh=0.5, order=2)
+    return solve(axisymmetric_cases.pressed_cylinders(0.5), maxh=0.5, order=2)
 
 
 @pytest.mark.parametrize(("angle", "sections"), [(360.0, 60), (270.0, 46), (90.0, 16), (4.0, 4)])
@@ -211,7 +214,7 @@ def test_what_is_refused(tmp_path, pressed):
             pressed.revolved(tmp_path / "body.vtu", angle=angle)
     with pytest.raises(ValueError, match=r"must end in '.vtu'"):
         pressed.revolved(tmp_path / "body.vtk")
-    plane = solve(replace(cases.pressed_cylinders(), model="plane strain"), maxh=1.0)
+    plane = solve(replace(axisymmetric_cases.pressed_cylinders(), model="plane strain"), maxh=1.0)
     with pytest.raises(ValueError, match='model "plane strain": a body of revolution has'):
         plane.revolved(tmp_path / "body.vtu")
     assert list(tmp_path.iterdir()) == []
@@ -219,7 +222,7 @@ def test_what_is_refused(tmp_path, pressed):
 
 def test_interrupted_writing_leaves_both_old_files(tmp_path, monkeypatch):
     """Contact points are written after the bodies."""
-    write_solution(tmp_path / "a.vtu", stub(1))
+    write_solution(tmp_path / "a.vtu", disc(1))
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
     class Interrupted(vtkIOXML.vtkXMLPolyDataWriter):
@@ -228,6 +231,6 @@ def test_interrupted_writing_leaves_both_old_files(tmp_path, monkeypatch):
 
     monkeypatch.setattr(vtkIOXML, "vtkXMLPolyDataWriter", Interrupted)
     with pytest.raises(KeyboardInterrupt):
-        write_solution(tmp_path / "a.vtu", stub(2))
+        write_solution(tmp_path / "a.vtu", disc(2))
     assert len(before) == 2
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
