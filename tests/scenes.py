@@ -42,10 +42,14 @@ def unmatched_blocks():
     return OCCGeometry(shape, dim=2)
 
 
-def rectangle(name, x, y, sides):
-    """Body between x[0] and x[1], y[0] and y[1]; names of bottom, right, top and left, or one."""
+def rectangle(name, x, y, sides=None):
+    """Body between x[0] and x[1], y[0] and y[1]; `sides`: bottom, right, top and left, or all.
+
+    Their names are "name_bottom" and so on if none are given.
+    """
     (a, b), (c, d) = x, y
-    names = [sides] * 4 if isinstance(sides, str) else sides
+    names = sides or [f"{name}_{side}" for side in ("bottom", "right", "top", "left")]
+    names = [names] * 4 if isinstance(names, str) else names
     return body(name, polygon([(a, c), (b, c), (b, d), (a, d)], names))
 
 

@@ -37,19 +37,15 @@ def pressed_disc() -> Problem:
 
 def stack() -> Problem:
     """Three blocks: a on a support, b on a, c on b; c is pressed off its middle."""
-
-    def block(name, low, high):
-        sides = [f"{name}_{side}" for side in ("below", "right", "above", "left")]
-        return rectangle(name, (-1.0, 1.0), (low, high), sides)
-
+    heights = {"a": (0, 1), "b": (1, 1.5), "c": (1.5, 2.5)}
     return Problem(
-        geometry=compound(block("a", 0, 1), block("b", 1, 1.5), block("c", 1.5, 2.5)),
+        geometry=compound(*(rectangle(name, (-1, 1), y) for name, y in heights.items())),
         materials={"a": SOFT, "b": STIFF, "c": SOFT},
-        displacement={"a_below": (0, 0)},
+        displacement={"a_bottom": (0, 0)},
         sliding="b_left|c_left",
-        traction={"c_above": (0.0, -0.1 * (1 + ng.x))},
+        traction={"c_top": (0.0, -0.1 * (1 + ng.x))},
         force={"b": (0, -0.05)},
-        contact=[Contact("b_below", "a_above"), Contact("c_below", "b_above", direction=(0, -1))],
+        contact=[Contact("b_bottom", "a_top"), Contact("c_bottom", "b_top", direction=(0, -1))],
     )
 
 

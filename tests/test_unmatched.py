@@ -33,13 +33,10 @@ UNIFORM = (0.3 * 1.3 * ng.x, -(1 - 0.3**2) * ng.y)  # plane strain under -1 alon
 def over_a_slot(width, middle, pairs):
     """A plate on two blocks, 0 < x < 1, with a slot between them; uniform pressure 1."""
     slot = middle - width / 2, middle + width / 2
-    places = {"plate": (0, 1), "a": (0, slot[0]), "b": (slot[1], 1)}
     bodies = [
-        rectangle(
-            *(name, x, (0, 0.5) if name == "plate" else (-0.5, 0)),
-            [f"{name}_{side}" for side in ("bottom", "side", "top", "side")],
-        )
-        for name, x in places.items()
+        rectangle("plate", (0, 1), (0, 0.5)),
+        rectangle("a", (0, slot[0]), (-0.5, 0)),
+        rectangle("b", (slot[1], 1), (-0.5, 0)),
     ]
     problem = Problem(
         geometry=OCCGeometry(Compound(bodies), dim=2),

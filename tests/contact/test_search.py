@@ -49,11 +49,7 @@ def test_the_gallery_s_pairs(geometry, within, expected):
 @pytest.mark.parametrize("within", [0.6, 1.1, 10.0])
 def test_nothing_is_found_through_a_body(within):
     """Behind a body, seen from its far side, another one is no partner, whatever `within` is."""
-    names = ("bottom", "side", "top", "side")
-    bodies = (
-        rectangle(body, (0, 1), y, [f"{body}_{side}" for side in names])
-        for body, y in (("lower", (0.0, 0.5)), ("upper", (0.5, 1.0)))
-    )
+    bodies = rectangle("lower", (0, 1), (0.0, 0.5)), rectangle("upper", (0, 1), (0.5, 1.0))
     found = find_contacts(compound(*bodies), within=within)
     assert sides(found) == [("lower_top", "upper_bottom")]
 

@@ -13,6 +13,7 @@ from ngcontact.discrete.discrete_problem import minimise_energy
 from ngcontact.geometries import rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
+from tests.scenes import rectangle
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 WEIGHT = 0.1  # of a disc, per area
@@ -79,19 +80,14 @@ def test_no_equilibrium(load, motion, work):
 
 def seesaw(inside=0.0, secondary=0, rows="auto"):
     """A plate with the load 4, whose middle is so far inside of the end of the block below."""
-    x = [2 - inside, -2 - inside]
-    outlines = {
-        "plate": [(x[0], 1), (x[1], 1), (x[1], 0), (x[0], 0)],
-        "block": [(0, 0), (-2, 0), (-2, -1), (0, -1)],
-    }
-    names = ["top", "side", "foot", "side"]
-    sides = "plate_foot", "block_top"
+    sides = "plate_bottom", "block_top"
     return Problem(
         geometry=compound(
-            *(body(k, polygon(v, [f"{k}_{n}" for n in names])) for k, v in outlines.items())
+            rectangle("plate", (-2 - inside, 2 - inside), (0, 1)),
+            rectangle("block", (-2, 0), (-1, 0)),
         ),
         materials={".*": STEEL},
-        displacement={"block_foot": (0, 0)},
+        displacement={"block_bottom": (0, 0)},
         traction={"plate_top": 1.0},
         contact=[Contact(sides[secondary], sides[1 - secondary], rows=rows)],
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Box, Circle, Compound, MoveTo, OCCGeometry, Y, Z
+from netgen.occ import Box, Circle, Compound, MoveTo, OCCGeometry, Y
 
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
@@ -15,6 +15,7 @@ from ngcontact.geometries.region import compound
 from tests.given_meshes import two_blocks
 from tests.runs import solved
 from tests.scenes import divided, rectangle
+from tests.solids.meshes import named
 
 
 def partly_lifted():
@@ -35,13 +36,11 @@ def test_a_force_at_a_clamped_end_counts_in_the_bar(order, h):
 
 def test_radial_contact_about_an_axis_has_no_resultant():
     """Neither radially, by symmetry, nor along the axis, which no direction of contact has."""
-    tubes = {"shaft": (1, 2), "hub": (2, 3)}
-    bodies = (rectangle(k, r, (0, 1), (k, f"{k}_outer", k, f"{k}_inner")) for k, r in tubes.items())
     problem = Problem(
-        geometry=compound(*bodies),
+        geometry=compound(rectangle("shaft", (1, 2), (0, 1)), rectangle("hub", (2, 3), (0, 1))),
         materials={"shaft|hub": Elastic(E=100.0, nu=0.3)},
-        displacement={"shaft|hub": (None, 0)},
-        contact=[Contact("shaft_outer", "hub_inner", direction=(1, 0), gap=-0.01)],
+        displacement={".*_bottom|.*_top": (None, 0)},
+        contact=[Contact("shaft_right", "hub_left", direction=(1, 0), gap=-0.01)],
         model="axisymmetric",
     )
     q = solve(problem, maxh=0.5, order=2).quantities()
@@ -102,14 +101,12 @@ def test_the_table_reads():
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_body_without_contact_has_energy_and_stress(dim):
     """Under a pressure 1 on a top of size 1; the base slides, in plane strain nu presses beside."""
-    body = rectangle("body", (0, 1), (0, 2), ["base", "side", "top", "side"])
-    geometry = compound(body) if dim == 2 else OCCGeometry(Box((0, 0, 0), (1, 1, 2)))
-    if dim == 3:
-        geometry.shape.solids.name = "body"
-        geometry.shape.faces.name = "side"
-        geometry.shape.faces.Min(Z).name, geometry.shape.faces.Max(Z).name = "base", "top"
+    body = (
+        rectangle("body", (0, 1), (0, 2)) if dim == 2 else named("body", Box((0, 0, 0), (1, 1, 2)))
+    )
+    geometry = OCCGeometry(body, dim=dim)
     law = Elastic(E=10.0, nu=0.3)
-    load = {"sliding": "base", "traction": {"top": 1.0}}
+    load = {"sliding": "body_bottom", "traction": {"body_top": 1.0}}
     solution = solve(Problem(geometry, {"body": law}, **load), maxh=1.0, order=2)
     q = solution.quantities()
     assert q["energy"].value == pytest.approx(-(1 - (dim == 2) * law.nu**2) / law.E, rel=1e-12)
@@ -358,11 +355,9 @@ def test_the_pressure_as_a_function(scene, order):
 @pytest.mark.parametrize("start", [-3.0, 0.0])
 def test_a_guide_that_ends_on_a_line_makes_the_pressure_infinite(start):
     """As of a block that a wall guides on a wider one; not on a line of symmetry of both."""
-    names = ("bottom", "right", "top", "left")
     problem = Problem(
         geometry=compound(
-            rectangle("upper", (0, 2), (0, 1), [f"upper_{name}" for name in names]),
-            rectangle("lower", (start, 3), (-2, 0), [f"lower_{name}" for name in names]),
+            rectangle("upper", (0, 2), (0, 1)), rectangle("lower", (start, 3), (-2, 0))
         ),
         materials={"upper": Elastic(1.0, 0.3), "lower": Elastic(2.0, 0.3)},
         displacement={"lower_bottom": (None, 0)},

@@ -1,10 +1,19 @@
-"""Meshes of boxes as an import gives them: no geometry, equal cubes of six tetrahedra each."""
+"""Solids with names, and meshes of boxes as an import gives them: equal cubes, no geometry."""
 
 from itertools import permutations
 
 import ngsolve as ng
 import numpy as np
 from netgen.meshing import Element2D, Element3D, FaceDescriptor, Mesh, MeshPoint, Pnt
+from netgen.occ import Z
+
+
+def named(name, solid):
+    """A solid with its name; its faces are "name_top", "name_bottom" and "name_side"."""
+    solid.solids.name, solid.faces.name = name, f"{name}_side"
+    solid.faces.Max(Z).name, solid.faces.Min(Z).name = f"{name}_top", f"{name}_bottom"
+    return solid
+
 
 SIDES = ("left", "right", "front", "back", "bottom", "top")
 

@@ -12,7 +12,7 @@ from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.contact import with_roles
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import ball_on_block, shells
-from tests.solids.meshes import boxes
+from tests.solids.meshes import boxes, named
 
 # Radii 0.5, 1, 1.5, moduli 1 and 3, Poisson's ratios .3 and .2, overlap .01: c1 = .55, c2 = 7 / 19.
 PRESSURE = 0.01 / (0.55 + 7 / 19)
@@ -80,13 +80,8 @@ def test_press_fit_held_at_an_edge(order, mean, least, most):
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_exact_normals(order):
     """Of a sphere and of a cylinder, to round-off, on a refined mesh, at the seam and at a pole."""
-    ball, pin = occ.Sphere((0, 0, 0), 1), occ.Cylinder(occ.Pnt(4, 0, 0), occ.gp_Dir(0, 0, 1), 1, 2)
-    ball.faces.name, pin.faces.name = "ball", "end"
-    for face in pin.faces:
-        if abs(face.center.z - 1) < 0.5:
-            face.name = "pin"
-    for body, name in ((ball, "ball"), (pin, "pin")):
-        body.solids.name = name
+    ball, pin = occ.Sphere((0, 0, 0), 1), named("pin", occ.Cylinder((4, 0, 0), occ.Z, 1, 2))
+    ball.solids.name = ball.faces.name = "ball"
     mesh = ng.Mesh(occ.OCCGeometry(occ.Compound([ball, pin])).GenerateMesh(maxh=0.6))
     mesh.Refine()
     mesh.Curve(order)
@@ -95,7 +90,7 @@ def test_exact_normals(order):
     x = trace.point(facet, s)
     radial = x / np.linalg.norm(x, axis=1)[:, None]
     assert np.abs(trace.exact_normal(facet, s) - radial).max() < 1e-14
-    facet, s = trace.at_nodes(trace.segments("pin"))
+    facet, s = trace.at_nodes(trace.segments("pin_side"))
     x = trace.point(facet, s) - [4, 0, 0]
     x[:, 2] = 0.0
     radial = x / np.linalg.norm(x, axis=1)[:, None]
@@ -104,26 +99,23 @@ def test_exact_normals(order):
 
 def test_sliding_on_a_cylinder():
     """A pin in a rigid hole turns freely and bears a pressure at its ends: plane strain."""
-    pin = occ.Cylinder(occ.Pnt(0, 0, 0), occ.gp_Dir(0, 0, 1), 1, 1)
-    pin.solids.name = "pin"
-    for face in pin.faces:
-        face.name = {0: "low", 1: "high"}.get(round(2 * face.center.z) / 2, "round")
+    pin = named("pin", occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, 1, 1))
     nu = 0.3
     problem = Problem(
         geometry=occ.OCCGeometry(pin),
         materials={"pin": Elastic(1.0, nu)},
-        displacement={"low": (None, None, 0)},
-        sliding="round",
-        traction={"high": 1.0},
+        displacement={"pin_bottom": (None, None, 0)},
+        sliding="pin_side",
+        traction={"pin_top": 1.0},
     )
     solution = solve(problem, maxh=0.5, order=2)
     assert [str(motion).split(" ")[0] for motion in solution.free_motions] == ["rotation"]
     # Confined compression: E (1 - nu) / ((1 + nu) (1 - 2 nu)), on facets of order 2: 1e-3 measured.
     modulus = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
-    area = ng.Integrate(1, solution.mesh.Boundaries("high"))
+    area = ng.Integrate(1, solution.mesh.Boundaries("pin_top"))
     work = -2 * solution.energy
     assert work == pytest.approx(area / modulus, rel=5e-3)
-    assert solution.reactions["low"][2] == pytest.approx(area, rel=1e-12)
+    assert solution.reactions["pin_bottom"][2] == pytest.approx(area, rel=1e-12)
 
 
 @pytest.mark.parametrize("bilateral", [False, True])
@@ -221,18 +213,16 @@ def test_round_bodies_under_a_wide_secondary_are_not_pushed_apart(body, order):
     or, as their rays meet no extended facet, for NaN. Measured: 1.23 and 1.0 of the energy with the
     round body as secondary.
     """
-    block = occ.Box((-1, -1, -0.5), (1, 1, 0))
-    block.solids.name, body.solids.name = "block", "body"
-    block.faces.name, body.faces.name = "block_side", "rim"
-    block.faces.Max(occ.Z).name, block.faces.Min(occ.Z).name = "top", "bottom"
+    block = named("block", occ.Box((-1, -1, -0.5), (1, 1, 0)))
+    body.solids.name, body.faces.name = "body", "rim"
     problem = Problem(
         geometry=occ.OCCGeometry(occ.Compound([block, body])),
         materials={"block|body": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (0, 0, 0)},
+        displacement={"block_bottom": (0, 0, 0)},
         force={"body": (0, 0, -0.004)},
-        contact=[Contact("top", "rim", direction=(0, 0, 1))],
+        contact=[Contact("block_top", "rim", direction=(0, 0, 1))],
     )
-    exchanged = [Contact("rim", "top", direction=(0, 0, -1))]
+    exchanged = [Contact("rim", "block_top", direction=(0, 0, -1))]
     solution = solve(problem, maxh=0.5, order=order)
     other = solve(replace(problem, contact=exchanged), maxh=0.5, order=order)
     assert solution.pairs[0].line.gap.min() > -0.02 * 0.5
@@ -250,9 +240,7 @@ def test_a_wide_secondary_that_is_much_stiffer(stiffness):
     """
     ball = occ.Sphere((0, 0, 1), 1) * occ.Box((-2, -2, -1), (2, 2, 1))
     ball.solids.name, ball.faces.name, ball.faces.Max(occ.Z).name = "ball", "rim", "high"
-    block = occ.Box((-1.5, -1.5, -1.5), (1.5, 1.5, 0))
-    block.solids.name, block.faces.name = "block", "block_side"
-    block.faces.Max(occ.Z).name, block.faces.Min(occ.Z).name = "top", "bottom"
+    block = named("block", occ.Box((-1.5, -1.5, -1.5), (1.5, 1.5, 0)))
     axis = occ.Axis((0, 0, 0), occ.gp_Dir(1, -1, 2))
     turned = [body.Rotate(axis, 71) for body in (ball, block)]
     [high] = (face.center for face in turned[0].faces if face.name == "high")
@@ -260,11 +248,11 @@ def test_a_wide_secondary_that_is_much_stiffer(stiffness):
     problem = Problem(
         geometry=occ.OCCGeometry(occ.Compound(turned)),
         materials={"ball": Elastic(1.0, 0.3), "block": Elastic(stiffness, 0.3)},
-        displacement={"bottom": (0, 0, 0), "high": tuple(-0.03 * up)},
-        contact=[Contact("top", "rim", direction=tuple(up))],
+        displacement={"block_bottom": (0, 0, 0), "high": tuple(-0.03 * up)},
+        contact=[Contact("block_top", "rim", direction=tuple(up))],
     )
     solution = solve(problem, maxh=0.4, order=3)
-    held, pressed = (solution.reactions[name] @ up for name in ("bottom", "high"))
+    held, pressed = (solution.reactions[name] @ up for name in ("block_bottom", "high"))
     assert held == pytest.approx(-pressed, rel=1e-5)
     assert solution.force.sum() == pytest.approx(held, rel=1e-5)
     assert solution.energy == pytest.approx(1.15e-4, rel=0.1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ngcontact import Contact, NoEquilibriumError, Problem, solve
-from tests.solids.meshes import boxes
+from tests.solids.meshes import boxes, named
 from tests.solids.test_patch import LAWS
 
 
@@ -88,13 +88,11 @@ def test_facets_of_a_wide_secondary_face_in_part(order, angle, x, y):
     Measured: force 7e-12, moments 9e-12, area 7e-16. With mass matrices of all of phi on slivers
     the force was off by 5e-3, with a row wherever a point faces at all areas were by 5e-2.
     """
-    bodies = occ.Box((-1, -1, -1), (1, 1, 0)), occ.Box((-0.5, -0.5, 0), (0.5, 0.5, 1))
-    for body, name in zip(bodies, ("lower", "upper"), strict=True):
-        body.solids.name, body.faces.name = name, f"{name}_side"
-        body.faces.Max(occ.Z).name, body.faces.Min(occ.Z).name = f"{name}_top", f"{name}_bottom"
-    cube = bodies[1].Rotate(occ.Axis((0, 0, 0), occ.Z), angle).Move((x, y, 0))
+    block = named("lower", occ.Box((-1, -1, -1), (1, 1, 0)))
+    cube = named("upper", occ.Box((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    cube = cube.Rotate(occ.Axis((0, 0, 0), occ.Z), angle).Move((x, y, 0))
     problem = Problem(
-        geometry=occ.OCCGeometry(occ.Compound([bodies[0], cube])),
+        geometry=occ.OCCGeometry(occ.Compound([block, cube])),
         materials=LAWS,
         displacement={"lower_bottom": (0, 0, 0)},
         traction={"upper_top": ng.CF((0, 0, -1 - 0.45 * (ng.x - x)))},

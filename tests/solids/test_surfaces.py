@@ -11,7 +11,7 @@ from drivers.reference.solids import hertz_of_solids, relative_energy_error
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.fem import unknowns
 from ngcontact.geometries.solids import shells
-from tests.solids.meshes import boxes
+from tests.solids.meshes import boxes, named
 from tests.solids.test_curved import PRESSURE, errors, press_fit, unmatched
 from tests.solids.test_patch import TURN
 
@@ -191,10 +191,8 @@ def test_a_secondary_wider_than_its_primary(order):
 
     The field has the resultant of the contact, and no peak that the pressures of points lack.
     """
-    block, punch = occ.Box((-1, -1, -1), (1, 1, 0)), occ.Box((-0.53, -0.47, 0), (0.5, 0.5, 1))
-    for body, name in ((block, "block"), (punch, "punch")):
-        body.solids.name = name
-        body.faces.Max(occ.Z).name, body.faces.Min(occ.Z).name = f"{name}_top", f"{name}_bottom"
+    block = named("block", occ.Box((-1, -1, -1), (1, 1, 0)))
+    punch = named("punch", occ.Box((-0.53, -0.47, 0), (0.5, 0.5, 1)))
     problem = Problem(
         occ.OCCGeometry(occ.Compound([block, punch])),
         {".*": Elastic(1.0, 0.3)},
@@ -219,19 +217,15 @@ def test_the_wide_side_follows_a_round_rim():
 
     With the chords of whole edges as its rim the area was 4.5 % less, with those of quarters 0.33.
     """
-    foot = occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, 0.5, 1.2)
-    foot.faces.name, foot.solids.name = "side", "foot"
-    foot.faces.Min(occ.Z).name, foot.faces.Max(occ.Z).name = "sole", "top"
-    block = occ.Box((-1, -1, -1), (1, 1, 0))
-    block.faces.name, block.solids.name = "rest", "block"
-    block.faces.Min(occ.Z).name, block.faces.Max(occ.Z).name = "bottom", "face"
+    foot = named("foot", occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, 0.5, 1.2))
+    block = named("block", occ.Box((-1, -1, -1), (1, 1, 0)))
     problem = Problem(
         geometry=occ.OCCGeometry(occ.Compound([foot, block])),
         materials={"foot|block": Elastic(1.0, 0.3)},
-        displacement={"bottom": (0, 0, 0)},
-        sliding="side",
-        traction={"top": 0.02},
-        contact=[Contact("face", "sole", direction=(0, 0, 1))],
+        displacement={"block_bottom": (0, 0, 0)},
+        sliding="foot_side",
+        traction={"foot_top": 0.02},
+        contact=[Contact("block_top", "foot_bottom", direction=(0, 0, 1))],
     )
     solution = solve(problem, maxh=0.5, order=2)
     assert solution.contact_area() == pytest.approx(0.25 * np.pi, rel=5e-3)
