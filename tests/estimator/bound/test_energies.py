@@ -188,6 +188,26 @@ def test_the_proved_bar_is_as_large_as_the_error_of_a_displaced_block(order, bil
     assert error <= row.proved <= 1.6 * error  # measured 1.13, 1.31, 1.43
 
 
+@pytest.mark.parametrize(("order", "degree"), [(1, 2), (2, 4)])
+def test_the_proved_bar_is_what_elements_miss_of_a_support(order, degree):
+    """A column that cannot give way sideways: its force is that of the mean of u_D on the top.
+
+    u_h has the interpolant there. The stress of G is uniform, so that nothing else is missed.
+    """
+    law = Elastic(2.0, 0.0)
+    problem = Problem(
+        geometry=blocks(),  # of width 2 and height 2
+        materials={"upper": law, "lower": law},
+        displacement={"bottom": (None, 0), "top": (None, -0.01 * (1 + ng.x**degree))},
+        sliding="upper_left|upper_right|lower_left|lower_right",
+        contact=BILATERAL,
+    )
+    row = solve(problem, maxh=0.5, order=order).quantities()["force"]
+    error = abs(row.value - law.E * 0.01 * (1 + 1 / (degree + 1)))
+    assert 1e-6 < error < row.proved * (1 + 1e-9)
+    assert row.proved == pytest.approx(error, rel=1e-6)  # measured 4e-12 and 3e-7
+
+
 def test_the_proved_bar_is_that_of_the_force_the_other_way(monkeypatch):
     """Errors of F and -F are one: what lowers the bar of the one and raises the other's counts."""
     bars = []
