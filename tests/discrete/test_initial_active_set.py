@@ -87,6 +87,3 @@ def test_a_stiff_punch_held_by_contact_alone_is_right_or_refused() -> None:
     assert solution.contact_force()[1] == pytest.approx(0.01, rel=1e-7)
     with pytest.raises(ConvergenceError, match="moduli"):
         solve(pressed(1e12, **loads), maxh=2.0, order=2)
-
-
-SOFT, HARD = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)

@@ -10,6 +10,7 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from ngcontact.discrete.discrete_problem import MULTIGRID, minimise_energy
+from ngcontact.linalg import iterative
 from tests.scenes import REFINED
 
 ORDERS = (1, 2, 3, 4)
@@ -81,6 +82,21 @@ def test_adaptive_meshes(large, name: str, order: int):
     *_, solution = adapt(REFINED[name], order=order, max_dofs=6000)
     assert solution.work["factorizations"] == 0
     same(solution, direct(REFINED[name], solution.mesh, order=order))
+
+
+@pytest.mark.parametrize(
+    ("limit", "value"), [("MOST_CYCLES", 1), ("MOST_STEPS", 1), ("RESTARTS", 0)]
+)
+def test_systems_that_stall_are_factorised(large, caplog, monkeypatch, limit: str, value: int):
+    """In a Newton step, after many of them, and in the last refinement."""
+    monkeypatch.setattr(iterative, limit, value)
+    problem = REFINED["disc"]
+    mesh = uniform_mesh(problem, 1, 3000)
+    with caplog.at_level("INFO", logger="ngcontact"):
+        solution = solve(problem, mesh, order=1)
+    assert caplog.text.count("the matrix is factorised: ") == 1
+    assert solution.work["factorizations"] > 0
+    same(solution, direct(problem, mesh, order=1))
 
 
 def test_motions_that_no_contact_resists_ask_for_a_factor(large):

@@ -123,11 +123,6 @@ def edges_of(geometry, name):
     return [edge for edge in geometry.shape.edges if edge.name == name]
 
 
-def ends_of(geometry, name):
-    points = [point for edge in edges_of(geometry, name) for point in (edge.start, edge.end)]
-    return {(round(p.x, 13) + 0.0, round(p.y, 13) + 0.0) for p in points}
-
-
 def parts_of(geometry):
     """Bodies, and their sides."""
     shape = geometry.shape
@@ -202,19 +197,6 @@ def test_graph_edge_follows_the_function_evenly_in_x(f, bound):
     points = [edge.Value(t) for t in np.linspace(*edge.parameter_interval, 2001)]
     assert max(abs(p.y - f(p.x)) for p in points) < bound
     assert np.abs([p.x for p in points] - np.linspace(-1, 1, 2001)).max() < 1e-14  # round-off
-
-
-@pytest.mark.parametrize(
-    ("geometry", "first", "second"),
-    [
-        (blocks(line=LINE), "upper_contact", "lower_contact"),
-        (rings(), "inner_contact", "outer_contact"),
-        (punch(half_width=0.3), "punch_contact", "foundation_contact"),
-        (graphs(ripple, ripple), "upper_contact", "lower_contact"),
-    ],
-)
-def test_contact_edges_end_at_the_same_points(geometry, first, second):
-    assert ends_of(geometry, first) == ends_of(geometry, second)
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,13 @@
-"""V-cycles as good on every level, smoothers, iterative systems and what ends them."""
-
-import logging
+"""V-cycles as good on every level, smoothers, and what does not converge."""
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.linalg import iterative
 from ngcontact.linalg.iterative import IterativeSystems
 from ngcontact.linalg.multigrid import LONG_ROWS, GaussSeidel, StalledError, truncated_multigrid
 from ngcontact.linalg.sparse import cholesky, congruent, handed_over
-from ngcontact.qp import BorderedSystems, Iterate, minimise
+from ngcontact.qp import BorderedSystems
 from tests.scenes import REFINED, discrete, steps_of
 
 
@@ -70,67 +67,31 @@ def test_what_does_not_converge_is_said():
         multigrid.solve(np.full(K.shape[0], np.nan), 1e-10, 3)
 
 
-class Scene:
-    """One program, its factorisation, its multigrid, and how often that was made."""
-
-    def __init__(self, name: str, order: int, rounds: int, maxh: float = 0.5) -> None:
-        self.problem = discrete(REFINED[name], order, rounds, maxh)
-        self.program = self.problem.program
-        space = self.problem.space
-        _, self.matrix = congruent(space.form.mat, space.basis @ self.problem.basis.T)
-        self.factor = cholesky(self.matrix)
-        self.made = 0
-
-    def prepare(self, free):
-        self.made += 1
-        return truncated_multigrid(self.matrix, steps_of(self.problem, 300), free)
-
-    def systems(self):
-        return IterativeSystems(self.program, self.factor, self.prepare)
-
-    def direct(self) -> Iterate:
-        return minimise(BorderedSystems(self.program, self.factor))
-
-
-def same(one: Iterate, other: Iterate) -> None:
-    """Both solve the same program, to the digits that its condition leaves."""
-    np.testing.assert_array_equal(one.active, other.active)
-    # Measured 1e-13 to 5e-12 at 1e5 unknowns.
-    np.testing.assert_allclose(one.u, other.u, rtol=0, atol=1e-10 * np.abs(other.u).max())
-    np.testing.assert_allclose(one.force, other.force, rtol=0, atol=1e-10 * other.force.max())
-
-
-@pytest.mark.parametrize(
-    ("limit", "value"), [("MOST_CYCLES", 1), ("MOST_STEPS", 1), ("RESTARTS", 0)]
-)
-def test_systems_that_stall_are_factorised(caplog, monkeypatch, limit: str, value: int):
-    """In a Newton step, after many of them, and in the last refinement."""
-    monkeypatch.setattr(iterative, limit, value)
-    scene = Scene("disc", 1, 3)
-    with caplog.at_level(logging.INFO, logger="ngcontact"):
-        result = minimise(scene.systems())
-    assert caplog.text.count("the matrix is factorised: ") == 1
-    assert result.factorizations > 0
-    same(result, scene.direct())
-
-
 def test_systems_may_be_refined_in_any_order():
     """Without `solve` before, or after that of another set: the same solution."""
-    scene = Scene("disc on block", 1, 2)
-    m = len(scene.program.g)
+    problem, made = discrete(REFINED["disc on block"], 1, 2), []
+    program, space = problem.program, problem.space
+    _, matrix = congruent(space.form.mat, space.basis @ problem.basis.T)
+
+    def prepare(free):
+        made.append(free)
+        return truncated_multigrid(matrix, steps_of(problem, 300), free)
+
+    factor, m = cholesky(matrix), len(program.g)
+    known = BorderedSystems(program, factor)
+    systems = IterativeSystems(program, factor, prepare)
+
+    def check(active):
+        for found, right in zip(systems.refine(active), known.refine(active), strict=True):
+            np.testing.assert_allclose(found, right, rtol=0, atol=1e-10 * np.abs(right).max())
+
     one, other = np.arange(m) < m // 2, np.arange(m) > m // 3
-    known, systems = BorderedSystems(scene.program, scene.factor), scene.systems()
     for active in (one, other, one):
-        u, force = systems.refine(active)
-        right, forces = known.refine(active)
-        np.testing.assert_allclose(u, right, rtol=0, atol=1e-10 * np.abs(right).max())
-        np.testing.assert_allclose(force, forces, rtol=0, atol=1e-10 * np.abs(forces).max())
+        check(active)
         systems.solve(one)
-    assert scene.made == 1
+    assert len(made) == 1
     systems.forget()
-    systems.restart(scene.program)
+    systems.restart(program)
     assert systems.back_solves == 0
-    u, _ = systems.refine(one)
-    right, _ = known.refine(one)
-    np.testing.assert_allclose(u, right, rtol=0, atol=1e-10 * np.abs(right).max())
-    assert scene.made == 2
+    check(one)
+    assert len(made) == 2

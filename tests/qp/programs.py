@@ -1,7 +1,5 @@
 """Quadratic programs, factorisations and what is right of minimisers, for several tests."""
 
-from itertools import product
-
 import numpy as np
 import scipy.sparse as sp
 
@@ -124,21 +122,6 @@ def kkt_residual(program, result):
             np.abs(force / largest * (slack / length)).max(),
         )
     )
-
-
-def brute_force(program):
-    """Minimiser (n,) of the active set that violates the optimality conditions least, of all."""
-    A, f, B, g = program
-    n, m = A.shape[0], g.size
-    best, found = np.inf, np.zeros(n)
-    for active in product([False, True], repeat=m):
-        rows = np.flatnonzero(active)
-        K = np.block([[A, B[rows].T], [B[rows], np.zeros((rows.size, rows.size))]])
-        z = np.linalg.solve(K, np.concatenate([f, g[rows]]))
-        violation = max((B @ z[:n] - g).max(), (-z[n:]).max(initial=0.0))
-        if violation < best:
-            best, found = violation, z[:n]
-    return found
 
 
 def condition(program):

@@ -1,4 +1,4 @@
-"""Active sets: brute force, another solver, known cycles, ties, rigid motions, bad input."""
+"""Active sets: optimality, known cycles, ties, rigid motions, bad input."""
 
 from dataclasses import replace
 from itertools import product
@@ -17,7 +17,6 @@ from ngcontact.qp.schur_complement import BorderedSystems
 from tests.qp.programs import (
     CYCLES,
     ROUND_OFF,
-    brute_force,
     condition,
     counting_factor,
     dual,
@@ -47,15 +46,12 @@ def test_known_cycles_end_in_every_unit(name):
 
 @pytest.mark.parametrize("m", range(1, 9))
 @pytest.mark.study(witness=["1"])
-def test_random_problems_against_brute_force(m):
+def test_random_problems_are_solved(m):
+    """Their minimisers are unique: the optimality conditions tell whether they are found."""
     rng = np.random.default_rng(m)
     for _ in range(125):  # 1000 problems in all
         program = random_program(rng, m)
-        result = solve_qp(*program)
-        allowed = ROUND_OFF * condition(program)
-        assert kkt_residual(program, result) <= allowed
-        right = brute_force(program)
-        np.testing.assert_allclose(result.u, right, rtol=0, atol=allowed * np.abs(right).max())
+        assert kkt_residual(program, solve_qp(*program)) <= ROUND_OFF * condition(program)
 
 
 @settings(max_examples=1000, deadline=None)

@@ -83,37 +83,24 @@ before = np.geterr()
 ]
 
 
-@pytest.fixture(scope="module")
-def outputs():
+def test_a_notebook_shows_lines_and_a_widget():
+    """A line a level as progress, one for a solution; `draw` leaves NumPy's settings alone."""
     for name in ("anywidget", "ipykernel"):
         pytest.importorskip(name)
     nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
     cells = [nbformat.v4.new_code_cell(code) for code in CELLS]
     notebook = nbformat.v4.new_notebook(cells=cells)
     nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
-    return [cell.outputs for cell in notebook.cells]
-
-
-def shown(outputs, kind):
-    return [out["data"][kind] for out in outputs if kind in out.get("data", {})]
-
-
-def test_progress_is_a_line_a_level(outputs):
+    _, levels, drawn, [solution], _ = (cell.outputs for cell in notebook.cells)
     told, printed = (
-        "".join(out["text"] for out in outputs[1] if out["name"] == name).splitlines()
+        "".join(out["text"] for out in levels if out["name"] == name).splitlines()
         for name in ("stderr", "stdout")
     )
     assert len(told) == len(printed) > 1
-
-
-def test_draw_shows_a_widget(outputs):
-    [view] = shown(outputs[2], "application/vnd.jupyter.widget-view+json")
+    kind = "application/vnd.jupyter.widget-view+json"
+    [view] = [out["data"][kind] for out in drawn if kind in out.get("data", {})]
     assert view["model_id"]
-
-
-def test_a_solution_is_a_line(outputs):
-    [solution] = shown(outputs[3], "text/plain")
-    assert solution.startswith("order 4")
+    assert solution["data"]["text/plain"].startswith("order 4")
 
 
 def test_without_the_extra_draw_says_what_to_install(monkeypatch):
