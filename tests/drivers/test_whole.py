@@ -1,4 +1,4 @@
-"""Drivers as a whole, on small meshes: what they find, print and write."""
+"""Drivers as a whole, on small meshes: what they find, print and write; published problems."""
 
 import math
 from functools import partial
@@ -10,6 +10,8 @@ from drivers import bounds, convergence, hertz, laws, published, spheres
 from drivers import parameter_study as study
 from drivers.adaptive_study.__main__ import main as adaptive_study
 from drivers.benchmark.__main__ import main as benchmark
+from drivers.published import PUBLISHED
+from drivers.reference.half_spaces import Hertz
 
 DISC = ["disc on rigid plane"]
 ONE_BLOCK = {"problems": ["block"], "rounds": 1, "max_dofs": 10_000}
@@ -85,3 +87,25 @@ def test_a_page_of_published_problems_is_written(tmp_path):
     published.main(("patch test",), order=1, max_dofs=500, page=tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert "| mean pressure, Pa | 100000 | 100000 |" in text
+
+
+def test_closed_forms_give_the_published_figures():
+    """Four to six digits, as the sources print them."""
+    roller = Hertz(35e3, 50.0, 1 / (0.91 / 210e3 + 0.91 / 70e3))
+    assert roller.cylinder() == pytest.approx((6.2146, 3585.37), rel=1e-5)
+    spheres = Hertz(1e4, 1.0, 7.5e6)
+    assert spheres.sphere()[0] == pytest.approx(0.1, rel=1e-12)
+    plane = Hertz(188.49556, 8.0, 1000 / 0.91)
+    assert plane.sphere()[0] == pytest.approx(1.010, rel=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "max_dofs"),
+    [("patch test", 1000), ("rotating rings", 3000), ("rounded punch", 50_000)],
+)
+@pytest.mark.study(witness=["patch test-1000", "rotating rings-3000"])
+def test_computed_figures_are_the_published_ones(name, max_dofs):
+    figures = PUBLISHED[name].figures
+    solution = published.solved(PUBLISHED[name], 2, max_dofs)
+    for figure, row in zip(figures, published.rows_of(figures, solution), strict=True):
+        assert abs(row[3]) <= figure.within
