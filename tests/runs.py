@@ -1,7 +1,10 @@
-"""Runs that several tests read: solutions are immutable, so are estimates and bounds made once."""
+"""Runs that several tests read, made once as solutions are immutable; what a run calls."""
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
+from types import CodeType
 
 from drivers.reference.cases import Case
 from ngcontact import Problem, Solution, adapt
@@ -20,3 +23,14 @@ def levels(case: Callable[[], Case | Problem], order: int, max_dofs: int) -> tup
 def solved(case: Callable[[], Case | Problem], order: int, max_dofs: int) -> Solution:
     """The last of them."""
     return levels(case, order, max_dofs)[-1]
+
+
+@contextmanager
+def recorded() -> Iterator[list[CodeType]]:
+    """The code of every Python function called, in order."""
+    calls, before = list[CodeType](), sys.getprofile()
+    sys.setprofile(lambda frame, event, _: calls.append(frame.f_code) if event == "call" else None)
+    try:
+        yield calls
+    finally:
+        sys.setprofile(before)

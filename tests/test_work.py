@@ -1,7 +1,5 @@
 """A scene pays only for what it contains: counts of the work done, never seconds."""
 
-import sys
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -10,6 +8,7 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import Contact, solve
 from ngcontact.mesh import first_mesh
+from tests.runs import recorded
 
 
 def two_blocks(gap=None):
@@ -79,18 +78,9 @@ def test_a_large_cold_start_follows_a_coarse_run():
 def test_a_small_level_calls_few_functions_of_python(made, order, most):
     """What a level of a thousand unknowns costs is calls: of `solve` and the estimate."""
     problem = made()
-    mesh, calls = first_mesh(problem, None), 0
-
-    def count(frame, event, argument):
-        nonlocal calls
-        calls += event == "call"
-
+    mesh = first_mesh(problem, None)
     _ = solve(problem, mesh, order=order).error_estimate  # what is made once a process
     mesh = ng.Mesh(mesh.ngmesh.Copy())  # of which nothing is known yet
-    before = sys.getprofile()
-    sys.setprofile(count)
-    try:
+    with recorded() as calls:
         _ = solve(problem, mesh, order=order).error_estimate
-    finally:
-        sys.setprofile(before)
-    assert 0 < calls <= most
+    assert 0 < len(calls) <= most

@@ -2,8 +2,6 @@
 
 import inspect
 import re
-import sys
-from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 
@@ -13,6 +11,7 @@ from PIL import Image
 from drivers.reference import cases
 from ngcontact import adapt, solve
 from tests.docs.pages import resolved
+from tests.runs import recorded
 
 NEW = "run python docs/developers/architecture.py"
 
@@ -32,26 +31,9 @@ def test_page_lists_the_imports_of_today(architecture):
     assert architecture.page(text, architecture.imports()) == text, NEW
 
 
-# The walks.
-
-
-@contextmanager
-def recorded(calls):
-    """Append the code of every Python function called."""
-
-    def note(frame, event, arg):
-        if event == "call":
-            calls.append(frame.f_code)
-
-    sys.setprofile(note)
-    try:
-        yield
-    finally:
-        sys.setprofile(None)
-
-
-def walk(architecture, name):
-    """The functions of a walk of the page, in order."""
+@pytest.mark.parametrize("name", ["solve", "adapt"])
+def test_walk_goes_the_way_of_the_code(architecture, name):
+    """The functions of a walk of the page are called, in order."""
     [section] = re.findall(
         rf"^## A `Problem` walks through `{name}`\n(.*?)^## ",
         architecture.PAGE.read_text(),
@@ -59,20 +41,14 @@ def walk(architecture, name):
     )
     steps = re.findall(r"^\| \d+ \| `([\w.]+)` \|", section, re.MULTILINE)
     assert len(steps) > 10
-    return steps
-
-
-@pytest.mark.parametrize("name", ["solve", "adapt"])
-def test_walk_goes_the_way_of_the_code(architecture, name):
-    steps, problem, calls = walk(architecture, name), cases.pressed_disc(), []
-    with recorded(calls):
+    problem = cases.pressed_disc()
+    with recorded() as calls:
         if name == "solve":
             solve(problem, maxh=0.4, order=2)
         else:
             list(islice(adapt(problem, maxh=0.4, order=2), 2))
     way = iter(calls)
-    met = [step for step in steps if inspect.unwrap(resolved(step)).__code__ in way]
-    assert met == steps
+    assert [step for step in steps if inspect.unwrap(resolved(step)).__code__ in way] == steps
 
 
 THEORY = (Path(__file__).parents[2] / "docs" / "theory.md").read_text()
