@@ -86,10 +86,6 @@ def test_segments_of_a_given_mesh_may_run_either_way(order):
         assert other.reactions[name] == pytest.approx(reaction, abs=1e-12 * PRESSURE * BORE)
 
 
-def plate(below="side"):
-    return rectangle("body", (0, 4), (0, 3), (below, "side", "side", "side"))
-
-
 def test_a_cut_that_takes_nothing_away_is_told():
     """OCC subtracts no face that was drawn clockwise; its outline stays as a line in the body."""
     corners = [(1, 4), (2, 1), (3, 4)]
@@ -99,7 +95,7 @@ def test_a_cut_that_takes_nothing_away_is_told():
             pen.LineTo(*corner)
         notch = pen.Face()
         notch.edges.name = "flank"
-        shape = plate("below") - notch
+        shape = rectangle("body", (0, 4), (0, 3), ("below", "side", "side", "side")) - notch
         problem = Problem(
             OCCGeometry(shape, dim=2), {"body": STEEL}, {"below": (0, 0)}, traction={"flank": 1.0}
         )

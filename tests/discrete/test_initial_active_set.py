@@ -18,12 +18,6 @@ def prepared(problem, maxh, order):
     return discretise(problem, mesh, order, "isoparametric")
 
 
-def state(line, active):
-    """A pair without gaps or forces."""
-    nothing = np.zeros(len(line.node))
-    return ContactState(line, nothing, nothing, active)
-
-
 def test_points_that_touch_start_active():
     problem = cases.pressed_disc()
     discrete = prepared(problem, 0.4, 2)
@@ -41,7 +35,9 @@ def test_a_new_point_between_two_is_active_if_one_of_them_is():
     new = replace(
         coarse, node=coarse.node[:1], position=middle[None], direction=coarse.direction[:1]
     )
-    assert carried_active_set([new], [state(coarse, active)]).tolist() == [True]
+    none = np.zeros(len(at))  # gaps and forces
+    old = ContactState(coarse, none, none, active)
+    assert carried_active_set([new], [old]).tolist() == [True]
 
 
 def test_points_around_a_transition_are_told_by_their_side_of_it():

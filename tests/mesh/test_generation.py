@@ -200,7 +200,7 @@ def laid(gap, maxh, unit=1.0):
 def test_elsewhere_nodes_stay_as_they_are(gap, why):
     _, nodes = laid(gap, 0.2)
     _, even = laid(lambda t: np.ones(len(t)), 0.2)
-    np.testing.assert_array_equal(nodes, even), why
+    np.testing.assert_array_equal(nodes, even, err_msg=why)
 
 
 def test_places_beside_ends_and_others_leave_no_slivers():

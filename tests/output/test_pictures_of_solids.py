@@ -4,12 +4,12 @@ import matplotlib.image
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Box, Compound, OCCGeometry, X, Z
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solids, write_film
 from ngcontact.output.surface import contact_surface
 from tests.output.solutions import PRESSURE, pressed_ball, pressed_cube
+from tests.solids.meshes import boxes
 
 
 @pytest.fixture(scope="module")
@@ -96,32 +96,20 @@ def test_what_is_refused(tmp_path):
     assert not path.exists()
 
 
-def boxes(**corners):
-    """Solids, each made of boxes given by opposite corners; faces are named as "slab_left"."""
-    solids = []
-    for name, places in corners.items():
-        for low, high in places:
-            body = Box(low, high)
-            body.solids.name, body.faces.name = name, f"{name}_side"
-            body.faces.Min(X).name, body.faces.Max(X).name = f"{name}_left", f"{name}_right"
-            body.faces.Min(Z).name, body.faces.Max(Z).name = f"{name}_bottom", f"{name}_top"
-            solids.append(body)
-    return OCCGeometry(Compound(solids))
-
-
 @pytest.mark.parametrize("sliding", [(), ".*_bottom"])
 def test_upright_faces_in_contact_are_seen_from_above(sliding, tmp_path):
     """Cut by a plane z = const, of symmetry or not, to which upwards is normal."""
     problem = Problem(
-        geometry=boxes(wall=[((-1, 0, 0), (0, 1, 1))], slab=[((0, 0, 0), (1, 1, 1))]),
+        geometry=boxes(
+            ("wall", (-1, 0, 0), (0, 1, 1), (2, 2, 2)), ("slab", (0, 0, 0), (1, 1, 1), (2, 2, 2))
+        ),
         materials={"wall|slab": Elastic(E=1.0, nu=0.0)},
         displacement={"wall_left": (0, 0, 0)},
         sliding=sliding,
         traction={"slab_right": PRESSURE},
         contact=[Contact("slab_left", "wall_right")],
     )
-    solution = solve(problem, maxh=0.7, order=2)
-    figure = plot_solids(solution, tmp_path / "a.png")
+    figure = plot_solids(solve(problem, order=2), tmp_path / "a.png")
     for line in panel(figure, "contact pressure").lines[:-1]:
         np.testing.assert_allclose(line.get_ydata(), PRESSURE, rtol=1e-9)
     (image,) = panel(figure, "deformed").images

@@ -11,6 +11,7 @@ from ngcontact.geometries import disc_on_block
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.problem import MeshArrays, bisect
 from ngcontact.problem.checks import _inside
+from tests.scenes import rectangle
 
 
 @pytest.fixture(params=[1, 3], ids=["straight", "curved"])
@@ -64,21 +65,13 @@ def test_only_marked_elements_are_bisected(mesh):
 SOFT = Elastic(E=1.0, nu=0.3)
 
 
-def cylinder(left=0.0, size=1.0):
-    """Cylinder left < x < 1, 0 < y < 1, times `size`."""
-    corners = [(size * x, size * y) for x, y in [(left, 0), (1, 0), (1, 1), (left, 1)]]
-    return compound(body("body", polygon(corners, ["bottom", "side", "top", "axis"])))
-
-
-def problem(**changes):
-    left, size = changes.pop("left", 0.0), changes.pop("size", 1.0)
+def problem(left=0.0, size=1.0, **changes):
+    """A cylinder left < r < 1, 0 < z < 1, times `size`."""
+    sides = ["bottom", "side", "top", "axis"]
+    section = rectangle("body", (left * size, size), (0, size), sides)
     data = {"displacement": {"bottom": (None, 0)}, "traction": {"top": 1.0}}
-    return Problem(
-        geometry=cylinder(left, size),
-        materials={"body": SOFT},
-        model="axisymmetric",
-        **data | changes,
-    )
+    data |= {"materials": {"body": SOFT}, "model": "axisymmetric"}
+    return Problem(compound(section), **data | changes)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])

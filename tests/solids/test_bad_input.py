@@ -14,7 +14,7 @@ from ngsolve.meshes import MakeStructured2DMesh, MakeStructured3DMesh
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.problem import MeshArrays, move_vertices
-from tests.solids.meshes import boxes
+from tests.solids.meshes import boxes, named
 from tests.solids.test_patch import LAWS, blocks, pressed
 
 SOFT = Elastic(1.0, 0.3)
@@ -22,11 +22,7 @@ BOX = {"a": SOFT}
 
 
 def box(name="a"):
-    solid = occ.Box((0, 0, 0), (1, 1, 1))
-    solid.solids.name = name
-    solid.faces.name = "side"
-    solid.faces.Min(occ.Z).name = "bottom"
-    return solid
+    return named(name, occ.Box((0, 0, 0), (1, 1, 1)))
 
 
 def mixed():
@@ -47,7 +43,7 @@ def gap_of_two(x, y):
     return 0 * x
 
 
-OBSTACLE = {"secondary": "bottom", "direction": (0, 0, -1), "gap": 0.0}
+OBSTACLE = {"secondary": "a_bottom", "direction": (0, 0, -1), "gap": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -56,8 +52,8 @@ OBSTACLE = {"secondary": "bottom", "direction": (0, 0, -1), "gap": 0.0}
         ({"geometry": mixed}, ValueError, "bound none of them: bodies are either solids or faces"),
         ({"geometry": hollow}, ValueError, "has no solids, and its faces lie in no plane"),
         ({"geometry": glued}, ValueError, "bounds two solids.*Compound, not Glue"),
-        ({"displacement": {"bottom": (0, 0)}}, ValueError, "length 2: give a triple"),
-        ({"traction": {"side": (0, 1)}}, ValueError, "length 2: give a triple"),
+        ({"displacement": {"a_bottom": (0, 0)}}, ValueError, "length 2: give a triple"),
+        ({"traction": {"a_side": (0, 1)}}, ValueError, "length 2: give a triple"),
         ({"force": {"a": ng.CF((0, 1))}}, ValueError, r"dims \(2,\): give a 3-vector"),
         ({"model": "plane stress"}, ValueError, "is for plane bodies: leave it out with solids"),
         ({"materials": {"a": Hooke(np.eye(3))}}, ValueError, r"\(3, 3\).*needs a 6x6"),
@@ -209,10 +205,8 @@ def two_boxes(first, second, **data):
 
 def test_solids_drawn_with_two_dimensions():
     """Which turns some of their faces inside out."""
-    cube = occ.Box((0, 0, 0), (1, 1, 1))
-    cube.solids.name, cube.faces.name = "cube", "side"
-    geometry = occ.OCCGeometry(occ.Compound([cube]), dim=2)
-    problem = Problem(geometry, materials={"cube": SOFT}, displacement={"side": (0, 0, 0)})
+    geometry = occ.OCCGeometry(occ.Compound([box()]), dim=2)
+    problem = Problem(geometry, materials=BOX, displacement={"a_side": (0, 0, 0)})
     with pytest.raises(ValueError, match="as dim=2 turns faces inside out"):
         solve(problem, maxh=0.7)
 

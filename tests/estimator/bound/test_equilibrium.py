@@ -136,10 +136,10 @@ def test_the_certificate_is_of_the_tractions(certified):
     assert off[np.broadcast_to(free[:, None], off.shape)].max() <= ROUND_OFF * found.largest
 
 
-def resultant(solution, pair=0):
+def resultant(solution):
     """Of p* on straight lines."""
     trace = solution.discrete.space.trace
-    p = solution.equilibrated.pressure[pair]
+    [p] = solution.equilibrated.pressure
     length = np.linalg.norm(np.diff(trace.curve[p.segments][:, [0, -1]], axis=1)[:, 0], axis=1)
     return float((length * np.abs(np.diff(p.span, axis=1))[:, 0]) @ p.coefficients.mean(axis=1))
 

@@ -23,14 +23,6 @@ SIDES = ("bottom", "right", "top", "left")
 T = gauss_lobatto(DATA_DEGREE)  # where amounts are given
 
 
-def on_the_square(n=2):
-    """Cells of the unit square, and its problem."""
-    mesh = square(n)
-    names = "|".join(SIDES)
-    problem = Problem(geometry=mesh, materials={"body": LAW}, displacement={names: (0, 0)})
-    return problem, cells_of(boundary_trace(mesh, 1), NO_CUTS)
-
-
 def asked_of(cells, name, direction, amount):
     """A component of a displacement of (x, y) on a boundary."""
     side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(name)))
@@ -50,11 +42,6 @@ def parts_of_power(x, y, n):
     for _ in range(n):
         a, b = a * x - b * y, a * y + b * x
     return a, -b
-
-
-def energy(cells, problem, asked, degree):
-    """|w|^2."""
-    return float((lifted(problem, cells, asked, [], degree, 1.0) ** 2).sum())
 
 
 def of_least_energy(u, v, degree, degree_on_sides):
@@ -82,7 +69,9 @@ def of_least_energy(u, v, degree, degree_on_sides):
 @pytest.mark.parametrize(("n", "degree"), [(3, 4), (4, 5), (6, 4), (8, 2)])
 def test_the_field_of_least_energy(n, degree):
     """Conjugates of (x + i y)^n are gradients of harmonic polynomials: they need no forces."""
-    problem, cells = on_the_square(n=1)
+    mesh = square(1)
+    problem = Problem(mesh, {"body": LAW}, displacement={"|".join(SIDES): (0, 0)})
+    cells = cells_of(boundary_trace(mesh, 1), NO_CUTS)
     u, v = (lambda x, y, k=k: parts_of_power(x, y, n)[k] for k in (0, 1))
     # e = n ((x + i y)^(n-1)): 2 mu e : e = 4 mu n^2 |z|^(2 n - 2).
     t, w = np.polynomial.legendre.leggauss(2 * n)
@@ -91,27 +80,19 @@ def test_the_field_of_least_energy(n, degree):
     exact = 4 * moduli(LAW).mu * n**2 * r.sum()
     if degree < n:  # what is no polynomial of the degree is one of a higher degree on sides
         exact = of_least_energy(u, v, degree, n)
-    found = energy(cells, problem, whole(cells, u, v), degree)
-    assert found == pytest.approx(exact, rel=1e-10)
-
-
-def opposite(gap, **changes):
-    """Two blocks with a gap given as data, the upper one pressed down."""
-    pair = Contact("lower_contact", "upper_contact", direction=(0, 1), gap=gap, **changes)
-    problem = cases.hertz_contact().problem
-    return replace(problem, contact=[pair], displacement={"bottom": (0, 0), "top": (0, -0.02)})
-
-
-def facing_sides(solution):
-    (line,) = (x for x in solution.equilibrated.proof.dual.program.lines if x.pair is not None)
-    return line
+    norms = lifted(problem, cells, whole(cells, u, v), [], degree, 1.0)
+    assert (norms**2).sum() == pytest.approx(exact, rel=1e-10)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_the_gap_of_the_lifted_displacement(order):
     """Nowhere negative by its coefficients, the same number at vertices, 0 inside of contact."""
-    solution = solve(opposite(0.05 * ng.x**2), maxh=0.3, order=order)
-    facing, cells = facing_sides(solution), solution.equilibrated.proof.dual.cells
+    pair = Contact("lower_contact", "upper_contact", direction=(0, 1), gap=0.05 * ng.x**2)
+    pressed = {"bottom": (0, 0), "top": (0, -0.02)}
+    problem = replace(cases.hertz_contact().problem, contact=[pair], displacement=pressed)
+    solution = solve(problem, maxh=0.3, order=order)
+    dual = solution.equilibrated.proof.dual
+    [facing], cells = [x for x in dual.program.lines if x.pair is not None], dual.cells
     state = solution.pairs[0]
     whole = state.line.on_segments(state.active, False).all(axis=1)
     closed = np.isin(cells.segment[facing.side], state.line.segments[whole])
