@@ -136,18 +136,22 @@ class Stress:
     elements: Sequence[Element]
     coefficients: Sequence[Array]  # (b, m) on the triangles of each element
 
-    def values(self, at: Index, x: Array) -> Array:
-        """Stresses (k, q, v) at `x` (k, q, 2) of triangles `at` (k,), without radial forces."""
-        found = np.empty((*x.shape[:2], self.elements[0].strain.shape[2]))
+    def values(self, at: Index, local: Array) -> Array:
+        """Stresses (k, q, v) in triangles `at` (k,), without radial forces.
+
+        At (a, b) `local` (k, q, 2), or (q, 2) in each.
+        """
+        found = np.empty((len(at), local.shape[-2], self.elements[0].strain.shape[2]))
         for e, c in zip(self.elements, self.coefficients, strict=True):
             mine, some = e.among(at)
             if mine.size:
-                found[mine] = e.stress(c, coordinates(e.basis.corners[some], x[mine]), some)
+                found[mine] = e.stress(c, local if local.ndim == 2 else local[mine], some)
         return found
 
     def tractions(self, at: Index, x: Array, normal: Array) -> Array:
         """Tractions s n (k, q, 2) at `x` (k, q, 2) of `at` (k,), with unit `normal` (k, q, 2)."""
-        s = self.values(at, x)
+        corners = self.elements[0].places.cells.corners[at]
+        s = self.values(at, coordinates(corners, x))
         return np.asarray((to_traction(normal, s.shape[2]) @ s[..., None])[..., 0])
 
     def traction_moments(self) -> tuple[Array, float]:

@@ -135,8 +135,9 @@ class EquilibratedStress:
         part = first[np.arange(len(at)) + np.repeat(start - last + many, many)]
         share = coordinates(cells.corners[part], x[at, None])[:, 0]
         inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
-        own = part[np.lexsort((-np.arange(len(at)), inside, at))[last - 1]]
-        found = proof.stress.s.values(own, x[:, None])[:, 0]
+        chosen = np.lexsort((-np.arange(len(at)), inside, at))[last - 1]
+        own = part[chosen]
+        found = proof.stress.s.values(own, share[chosen, None])[:, 0]
         if found.shape[1] > 3:
             found[:, 2] += _radial(proof, own, reference)
         return found

@@ -23,12 +23,12 @@ relative estimate is more than 1.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Index, Mask
 from ...contact import ContactState, signed_distance, state_of
 from ...contact import area_in_contact as area_on_surface
 from ...discrete import load_by_shape
@@ -135,7 +135,7 @@ class Measured(Guaranteed):
         rows, note = list[Quantity](), ""
         if state is not None:
             rows, note, reason = _of_pair(self, state, pair, corners)
-        equilibrated = None if proof is None else proof.values
+        equilibrated = None if proof is None else partial(_on_lattice, proof)
         rows += [_energy(self, proof is not None), largest_von_mises(self, equilibrated, corners)]
         size, notes = float(np.abs(boundary.curve).max()), [note, reason]
         if proof is not None and proof.proof.dual.cells.curved.any():
@@ -146,6 +146,31 @@ class Measured(Guaranteed):
                 off_axis = np.abs(row.place) >= AXIS_COORDINATE * size
                 rows[k] = replace(row, place=np.where(off_axis, row.place, 0.0))
         return Quantities(tuple(rows), "; ".join(text for text in notes if text))
+
+
+def _on_lattice(
+    equilibrated: EquilibratedStress, element: Index, places: Array, known: Mask
+) -> Array:
+    """That stress (k * n, c) at the same n `places` (n, 2) of each `element` (k,).
+
+    It is 0 where it is not `known` (k, n). On elements with straight sides that are no parts its
+    polynomials have the same values at the places in each.
+    """
+    cells, n = equilibrated.proof.dual.cells, len(places)
+    own, count = np.zeros(cells.trace.mesh.ne, dtype=np.intp), np.bincount(cells.parent)
+    own[cells.parent] = np.arange(len(cells.parent))
+    alike = (count == 1) & ~cells.trace.curved_elements & (cells.trace.model.extent == 0)
+    found = np.zeros((*known.shape, equilibrated.proof.dual.elements[0].strain.shape[2]))
+    shares = np.column_stack([places, 1 - places.sum(axis=1)])
+    first = cells.barycentric[own, 0].argmax(axis=1)  # vertex of the element at corner 0
+    for k in range(3):
+        some = np.flatnonzero((alike & (first == k))[element])
+        local = np.roll(shares, -k, axis=1)[:, [2, 0]]
+        found[some] = equilibrated.proof.stress.s.values(own[element[some]], local)
+    known = known & ~alike[element, None]
+    at, place = known.nonzero()
+    found[known] = equilibrated.values(element[at], places[place])
+    return found.reshape(len(element) * n, -1)
 
 
 def _of_pair(

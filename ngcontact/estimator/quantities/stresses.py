@@ -147,9 +147,15 @@ def _clamped_angles(problem: Problem, trace: BoundaryTrace) -> Array:
 
 
 def largest_von_mises(
-    solution: Estimated, equilibrated: Callable[[Index, Array], Array] | None, corners: Singular
+    solution: Estimated,
+    equilibrated: Callable[[Index, Array, Mask], Array] | None,
+    corners: Singular,
 ) -> Quantity:
-    """The largest on a lattice, away from corners; `equilibrated` has that stress, if known."""
+    """The largest on a lattice, away from corners.
+
+    `equilibrated` has that stress, if known, (k * n, c) in elements (k,) at n places (n, 2) of
+    each, and 0 where it is not to be known (k, n).
+    """
     name, mesh = "von Mises", solution.mesh
     singular = corners.distinct(np.ones(len(corners.places), dtype=bool))
     m = CONSTANT if solution.order == 1 else DIVISIONS
@@ -161,7 +167,7 @@ def largest_von_mises(
     read = solution.stress, solution.out_of_plane_stress, ng.CF((ng.x, ng.y))
     s, normal, xy = (np.asarray(f(points)) for f in read)
     stress = np.hstack([s.reshape(-1, 4)[:, [0, 3, 1]], normal.reshape(-1, 1)])
-    mises, away = von_mises(stress), ~corners.near(xy)
+    mises, away = von_mises(stress), ~singular.near(xy)
     if not away.any():
         return Quantity(name, np.nan, singular=singular)
     at = int(np.where(away, mises, -np.inf).argmax())
@@ -170,17 +176,14 @@ def largest_von_mises(
     if solution.relative_error_estimate > 1 or alone:
         return Quantity(name, value, place=place, singular=singular)
     high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= STRESS_SHARE * value)
-    some = np.repeat(high, n)
-    off = _jumps(mesh, xy, mises, n)[some]
+    some, boundary = np.repeat(high, n), solution.discrete.space.trace
+    off = _jumps(boundary.arrays, high, xy, mises)
     if equilibrated is not None:
-        element = np.flatnonzero(high)
-        known = ~solution.discrete.space.trace.model.on_axis(xy)[some]  # there r = 0 divides
-        own, at_places = stress[some], np.tile(places, (len(element), 1))
-        found = equilibrated(np.repeat(element, n)[known], at_places[known])
-        whole = np.zeros((len(own), found.shape[1]))
-        whole[known] = found
-        other = whole[:, [0, 1, -1, 2]]
-        if whole.shape[1] == 3:  # out of the plane: nu times the trace, or 0
+        known = ~boundary.model.on_axis(xy)[some]  # there r = 0 divides
+        own = stress[some]
+        found = equilibrated(np.flatnonzero(high), places, known.reshape(-1, n))
+        other = found[:, [0, 1, -1, 2]]
+        if found.shape[1] == 3:  # out of the plane: nu times the trace, or 0
             trace, now = own[:, :2].sum(axis=1).reshape(-1, n), other[:, :2].sum(axis=1)
             square = (trace**2).sum(axis=1)
             ratio = (trace * own[:, 3].reshape(-1, n)).sum(axis=1) / np.where(square, square, 1.0)
@@ -189,22 +192,27 @@ def largest_von_mises(
         off = np.maximum(JUMP_FACTOR * off, apart)
     off = MISES_FACTOR * np.repeat(off.reshape(-1, n).max(axis=1), n)
     # The largest may lie between the last point that counts and the next one, at the reach.
+    xy = xy[some]
     size = np.ptp(xy.reshape(-1, n, 2), axis=1).max(axis=1)
-    counts = ~corners.near(xy, np.repeat(size / m, n))[some]
+    counts = ~singular.near(xy, np.repeat(size / m, n))
     error = error_of_largest(value, mises[some][counts], off[counts])
     return Quantity(name, value, error, "estimated", place, singular=singular)
 
 
-def _jumps(mesh: ng.Mesh, points: Array, mises: Array, n: int) -> Array:
-    """Differences (k,) of `mises` (k,) at equal ones of the `points` (k, 2) of a body, n by n."""
-    view = MeshArrays(mesh)
-    body = view.pieces[view.elements[:, 0]]
+def _jumps(view: MeshArrays, some: Mask, points: Array, mises: Array) -> Array:
+    """Differences (k * n,) of `mises` at equal points of a body, in k elements: `some` (ne,).
+
+    There are n of the `points` (ne * n, 2) in each element.
+    """
+    beside = np.isin(view.elements, view.elements[some]).any(axis=1)
+    n = len(points) // len(some)
+    points, mises = (x[np.repeat(beside, n)] for x in (points, mises))
     least = POINT_DISTANCE * float(np.ptp(view.corners, axis=1).max(axis=1).min())
     key = np.round(points / least).astype(np.int64)
-    key = np.column_stack([key, np.repeat(body, n)])
+    key = np.column_stack([key, np.repeat(view.pieces[view.elements[beside, 0]], n)])
     order = np.lexsort(key.T)
     first = np.append(True, (np.diff(key[order], axis=0) != 0).any(axis=1))
     start, found = np.flatnonzero(first), np.empty(len(mises))
     low, high = (f.reduceat(mises[order], start) for f in (np.minimum, np.maximum))
     found[order] = (high - low)[np.cumsum(first) - 1]
-    return found
+    return found.reshape(-1, n)[some[beside]].ravel()

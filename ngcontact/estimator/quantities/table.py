@@ -34,7 +34,7 @@ class Singular:
         """Mask (m,) of the `points` (m, 2) within the reach of a corner, less a `step` (m,)."""
         result = np.zeros(len(points), dtype=bool)
         for place, r in zip(self.places, self.reach, strict=True):
-            result |= np.linalg.norm(points - place, axis=1) + step <= r
+            result |= np.hypot(*(points - place).T) + step <= r
         return result
 
     def __str__(self) -> str:
