@@ -63,10 +63,10 @@ class Model:
         Of an initial strain with the components `e` (6,). The normal part, which has no way out in
         plane strain, bulges the plane by nu times itself.
         """
-        rows = np.eye(6, dtype=object)[list(self.components)]
+        found = summing(6, *((i,) for i in self.components)) * e
         if self.bulges and isinstance(law, Elastic):  # others have no such part: `Problem.check`
-            rows[:2, 2] = law.nu
-        return ng.CF(tuple(rows.ravel().tolist()), dims=rows.shape) * e
+            found += law.nu * (summing(6, (2,), (2,), ()) * e)
+        return found
 
     def stress(self, C: CF, e: CF) -> CF:
         """Voigt stress (q,) of a strain `e` (q,) by the law `C` (q, q), tau_ij in HH81 (2.6)."""
