@@ -16,6 +16,7 @@ from .quadratic_program import Anchor, QuadraticProgram, SingularError
 
 COARSE_RESIDUAL = 1e-11  # relative to the largest met, at which the next active set is chosen
 FINE_RESIDUAL = 1e-14  # ... and of the last system
+LOOSE_RESIDUAL = 1e-8  # ... that a step of another iteration may leave: rows change more than that
 BORDER = 20  # back-solves that cost as much as a factorisation: measured 17 to 25
 BORDER_ROUND_OFF = 1e-14  # of its singular values, relative to the largest
 WEAK = 1e-9  # stiffness of pins, compliance of rows in dense programs, that may be singular
@@ -138,8 +139,11 @@ class BorderedSystems:
         return self.y.copy(), self.force.copy()
 
     def approach(self, active: Mask) -> Array:
-        """Minimiser (n,) for `active` (m,) after one correction, as a step of another iteration."""
-        self._reach(active, None)
+        """Minimiser (n,) for `active` (m,) after one correction, as a step of another iteration.
+
+        That leaves residuals of `LOOSE_RESIDUAL` outside of the border to its next step.
+        """
+        self._reach(active, None, LOOSE_RESIDUAL)
         return self.y.copy()
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
@@ -220,7 +224,9 @@ class BorderedSystems:
                 stiffness[j] = 1 / p.left_sides(base.known[place])[j]
         return stiffness
 
-    def _reach(self, active: Mask, anchor: Anchor | None) -> Border:
+    def _reach(
+        self, active: Mask, anchor: Anchor | None, tolerance: float = COARSE_RESIDUAL
+    ) -> Border:
         """The system of an active set, after one correction."""
         p, base = self.program, self._base_near(active, anchor)
         self.system = system = self._bordered(base, active, anchor)
@@ -232,7 +238,7 @@ class BorderedSystems:
             self.y[p.null_space.pins[anchor.rigid]] = anchor.at[anchor.rigid]
         residual = self.unbalanced(active, anchor)
         self.scale = max(self.scale, system.largest(residual))
-        self._correct(system, residual, COARSE_RESIDUAL)
+        self._correct(system, residual, tolerance)
         return system
 
     def _base_near(self, active: Mask, anchor: Anchor | None) -> Base:

@@ -59,11 +59,11 @@ def force_bar(
     given = replace(dual.given, loads=np.zeros_like(dual.given.loads))
     moments = np.zeros_like(dual.moments)
     test = replace(dual, given=given, elements=elements, moments=moments)
-    nearest, ratio = _within(test, stress.pressure, np.inf)
-    size = float(np.linalg.norm(nearest.s.norms()[0]))
+    first, ratio = _within(test, stress.pressure, np.inf)
+    size = float(np.linalg.norm(first.s.norms()[0]))
     limit = max(kappa, KAPPA_GROWTH * size / B if B > 0 else 0.0)
-    if ratio > limit:
-        nearest, ratio = _within(test, stress.pressure, limit, nearest)
+    limit = limit if ratio > limit else np.inf
+    nearest, ratio = _within(test, stress.pressure, limit, first)
     t = test.admissible(nearest)
     size = float(np.linalg.norm(t.distance + t.loads))
     kappa = max(kappa, ratio, size / B if B > 0 else 0.0)  # up to M / B it costs nothing

@@ -42,7 +42,7 @@ UNBALANCED_LOAD = 1e-5
 # Diagonal of K relative to the largest: coordinates on the axis are 0 to round-off, measured 1e-62.
 AXIS_STIFFNESS = np.finfo(float).eps ** 2
 LIMIT_SLACK = 1.1  # ratio of a force to its limit up to which it stays as it is
-DIAGONAL_SHIFT = 1e-13  # of the diagonal, for vertices where tractions depend on each other
+DIAGONAL_SHIFT = 1e-14  # of the diagonal, for vertices where tractions depend on each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,8 @@ class DualProgram:
         """The stress that minimises B^2 for given tractions, `moments` (d,), with p* >= 0.
 
         With `limits` (k, j) of each line, not negative: one near to the strain without a gap, whose
-        |p*| are at most `LIMIT_SLACK` times these, from another one, `start`, where there is one.
+        |p*| are at most `LIMIT_SLACK` times these. That is made from another one, `start`; the
+        first one is for reading its size, after one correction.
 
         Raises
         ------
@@ -131,7 +132,8 @@ class DualProgram:
             right = np.where(p.fixed, 0.0, self.T.T @ left)
             size = float(np.abs(right).max(initial=0.0))
             most = np.inf if beyond.any() else FALLING_RATIO * last
-            if not MOMENT_ROUND_OFF * largest < size < most:
+            first = limits is not None and start is None
+            if not MOMENT_ROUND_OFF * largest < size < most or (first and last < np.inf):
                 break
             last = size
             self.systems.restart(replace(p, b=right, g=np.zeros_like(p.g)))
