@@ -7,7 +7,7 @@ import numpy as np
 from netgen.meshing import IdentificationType
 
 from ..arrays import Array, Integers
-from ..problem import PIECES, POSITION, MeshArrays
+from ..problem import PIECES, MeshArrays
 from .cad import CadEdge, cad_edges
 from .faces import curved_facets
 
@@ -19,8 +19,6 @@ SMALL_EDGE = 1e-2  # extent of an edge; measured: all but arcs of circles are wr
 # A segment of a curved edge; measured: elements of order 4 turn over at 5e-7.
 MIN_CURVED_LENGTH = 1e-6
 SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
-# Distance, relative to the geometry's size, at which an element misses its curve.
-CURVE_DISTANCE = 1e-12
 
 
 def vertex_parents(mesh: ng.Mesh) -> Integers:
@@ -92,29 +90,19 @@ def check_curves(mesh: ng.Mesh) -> None:
             )
 
 
-def _straightened(mesh: ng.Mesh) -> bool:
-    """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
-    off = ng.BoundaryFromVolumeCF(POSITION) - POSITION
-    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, POSITION))
-    return bool(missed > CURVE_DISTANCE**2 * size)
-
-
 def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     """Mesh curved to the element's degree, and the number of elements at curved edges or faces.
 
-    A mesh without an OCC geometry, without curved ones, or curved to that degree already is
-    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy. So it
-    is of a mesh with halved edges, which bisection keeps among those in use: a file of the mesh
-    has none, and numbers the edges otherwise.
+    A mesh of that degree is used as it is, and so is one without an OCC geometry or without curved
+    edges; otherwise the result is a copy. So it is of a mesh with halved edges, which NGSolve's
+    `Refine` straightened and keeps among those in use: a file of the mesh has none, and numbers
+    the edges otherwise.
     """
-    if ng.H1(mesh, order=2).ndof < mesh.nv + mesh.nedge:
-        before = mesh.GetCurveOrder()
-        mesh = copied(mesh)
-        if before > 1:
-            mesh.Curve(before)
-    degree = order if element == "isoparametric" else order + 1  # (2.8)
-    count = int(np.count_nonzero(curved_facets(mesh)))
-    if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
+    count, degree = int(np.count_nonzero(curved_facets(mesh))), mesh.GetCurveOrder()
+    if count:
+        degree = order if element == "isoparametric" else order + 1  # (2.8)
+    halved = ng.H1(mesh, order=2).ndof < mesh.nv + mesh.nedge
+    if mesh.GetCurveOrder() == degree and not halved:
         return mesh, count
     copy = copied(mesh)
     copy.Curve(degree)
