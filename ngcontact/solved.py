@@ -68,7 +68,10 @@ class Solved:
     @property
     def hoop_stress(self) -> ng.CoefficientFunction:
         """Hoop stress of a body of revolution, a scalar, in units of stress; refused in planes."""
-        return model_of(self.problem).hoop(self.out_of_plane_stress)
+        normal = self.out_of_plane_stress
+        if not model_of(self.problem).extent:
+            raise ValueError("a plane model has no hoop stress: out_of_plane_stress is what it has")
+        return normal
 
     @cached_property
     def pairs(self) -> list[ContactState]:

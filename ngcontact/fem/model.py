@@ -82,8 +82,7 @@ class Model:
 
     def volume(self, u: CF) -> CF:
         """Change of volume div u of a displacement or test function."""
-        grad = ng.Grad(u)
-        return grad[0, 0] + grad[1, 1]
+        return ng.Trace(ng.Grad(u))
 
     def gradients(self, u: CF, v: CF) -> CF:
         """Product of the gradients of two displacements."""
@@ -118,10 +117,6 @@ class Model:
         normal = mesh.MaterialCF(nu, default=0) * (voigt[0] + voigt[1])
         held = {k: law.E * e[2] for k, (law, e) in strains.items() if isinstance(law, Elastic)}
         return normal - mesh.MaterialCF(held, default=0) if held else normal
-
-    def hoop(self, normal: CF) -> CF:
-        """The hoop stress, `normal` to the plane; a `ValueError` without an axis."""
-        raise ValueError("a plane model has no hoop stress: out_of_plane_stress is what it has")
 
     def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
         """Divergence (2,) by that in the plane, `plane` (2,), `stress` (2, 2), `normal` to it."""
@@ -194,9 +189,6 @@ class _Axisymmetric(Model):
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         return voigt[2]
 
-    def hoop(self, normal: CF) -> CF:
-        return normal
-
     def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
         return plane + ng.CF((stress[0, 0] - normal(), stress[0, 1])) / ng.x  # inside of elements
 
@@ -213,9 +205,6 @@ class _Solid(Model):
         rows = (0,), (4,), (8,), (5, 7), (2, 6), (1, 3)
         return summing(9, *rows) * ng.Grad(u).Reshape((9,))  # (2.6)
 
-    def volume(self, u: CF) -> CF:
-        return ng.Trace(ng.Grad(u))
-
     def in_plane(self, voigt: CF) -> CF:
         """Stress (3, 3) by its Voigt components."""
         rows = (0,), (5,), (4,), (5,), (1,), (3,), (4,), (3,), (2,)
@@ -224,9 +213,6 @@ class _Solid(Model):
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         """Refused: all of the stress of a solid is in its tensor."""
         raise ValueError("a solid has no stress out of a plane: .stress has all of it, (3, 3)")
-
-    def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
-        return plane
 
 
 PLANE, SOLID_MODEL = Model(), _Solid()
