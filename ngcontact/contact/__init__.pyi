@@ -34,6 +34,5 @@ from .state import ContactState as ContactState
 from .state import Transitions as Transitions
 from .state import contact_states as contact_states
 from .state import ending_segments as ending_segments
-from .state import pressure_across_corners as pressure_across_corners
 from .state import state_of as state_of
 from .state import transitions_on as transitions_on

@@ -127,7 +127,6 @@ def ending_segments(line: ContactLine, ends: Transitions) -> Index:
     return np.flatnonzero(at.any(axis=1))
 
 
-TURN_COSINE = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
 # Of the radius of a zone around an axis, over which its pressure is fitted there.
 AXIS_SHARE = 1 / 3
 LONG_SEGMENT = 0.2  # over half a zone, from which its end is told better by force than by gap
@@ -234,31 +233,6 @@ def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array
             powers = np.column_stack([np.ones(len(near)), square[near] / square[near[-1]]])
             fit = np.linalg.lstsq(root[:, None] * powers, root * pressure[near], rcond=None)[0]
             pressure[i] = fit[0]
-    return pressure
-
-
-def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Array:
-    """Pressure (m,): force over weight, but at corners one value for both sides.
-
-    `Solution.pressure` is force over weight everywhere, which at corners of small turns splits the
-    node's force arbitrarily. A stress that is continuous at a corner without friction has
-    both normals as eigenvectors, so that both pressures are equal unless the sides are
-    perpendicular. Up to a turn of 45 degrees both get one value, from the part of the node's
-    force along the sum of weight times normal: what a uniform pressure on both sides exerts.
-    Of the `force` (m,) per unit thickness at the points of a `line`, `active` (m,) in contact.
-    """
-    pressure = force / line.weight
-    corners = twins(line)
-    if corners.size == 0 or line.contact.direction is not None:
-        return pressure
-    inside = in_contact(line, active)[corners].all(axis=1)
-    normal = line.direction[corners]  # (t, 2, 2), row i the normal of side i
-    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= TURN_COSINE
-    corners, normal = corners[inside], normal[inside]
-    uniform = (line.weight[corners][:, :, None] * normal).sum(axis=1)
-    resultant = (force[corners][:, :, None] * normal).sum(axis=1)
-    shared = (resultant * uniform).sum(axis=1) / (uniform**2).sum(axis=1)
-    pressure[corners] = shared[:, None]
     return pressure
 
 
