@@ -6,7 +6,6 @@ from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_corners as boundary_corners
 from .boundary import check_element as check_element
 from .boundary import connected_bodies as connected_bodies
-from .boundary import edge_bubbles as edge_bubbles
 from .boundary import prescribed_components as prescribed_components
 from .boundary import unknowns as unknowns
 from .boundary import unknowns_of as unknowns_of

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import ngsolve as ng
@@ -28,30 +28,11 @@ CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two r
 # one would be dependent to 1 / turn^2
 # Distance of a segment from its chord, relative to it, from which it is curved.
 CURVED_DISTANCE = 1e-12
+ENTRY_ROUND_OFF = 1e-13  # of changes of basis, whose entries are of size 1: round-off
 CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mesh without CAD
 ORDERS = (1, 2, 3, 4)
 ORDERS_OF_SOLIDS = (1, 2, 3)
 ELEMENTS = ("isoparametric", "superparametric", "physical")
-
-
-@lru_cache
-def edge_bubbles(order: int, axis: int = 0) -> Array:
-    """Values (order - 1, order - 1) of NGSolve's edge functions of H1 at the interior nodes.
-
-    Row i is the i-th interior Gauss-Lobatto point from the end with the lower vertex number,
-    column j the j-th edge function. Which points, says `axis`: see `gauss_lobatto`.
-    """
-    shape = ng.fem.H1FE(ng.ET.SEGM, order)  # from its vertex 0 at 1 to its vertex 1 at 0
-    points = 1 - gauss_lobatto(order, axis)[1:-1]
-    return np.array([shape.CalcShape(x, 0.0, 0.0).NumPy()[2:] for x in points.tolist()])
-
-
-@lru_cache
-def _edge_coefficients(order: int, axis: int) -> Array:
-    """Coefficients (order - 1, order + 1) of NGSolve's edge functions by values at all nodes."""
-    s = gauss_lobatto(order, axis)[1:-1]
-    values = np.column_stack([s - 1, np.eye(order - 1), -s])
-    return np.asarray(np.linalg.inv(edge_bubbles(order, axis)) @ values)
 
 
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
@@ -111,7 +92,7 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     value = bary - np.where((triangles[:, :, None] == trace.nodes[:, None, :]).any(axis=2), 0.5, 0)
     numbers = np.array([[*V.GetDofNrs(el.edges[0]), -1][0] for el in mesh.Elements(ng.BND)])
     on = numbers >= 0
-    bubble = 1 / edge_bubbles(2)[0, 0]
+    bubble = 1 / ng.fem.H1FE(ng.ET.SEGM, 2).CalcShape(0.5).NumPy()[2]
     rows = np.repeat(numbers[on], 3)
     edges = from_triplets(
         (bubble * value[on]).ravel(), rows, triangles[on].ravel(), (V.ndof // 2, mesh.nv)
@@ -154,6 +135,7 @@ class BoundaryTrace:
     geometry_order: int  # degree of the curve of a segment
     region: Index  # (k,), boundary region number
     nodes: Index  # (k, order + 1), numbers from s = 0 to s = 1
+    functions: Index  # (k, order + 1), NGSolve's unknowns, in its order
     element: Index  # (k,), the triangle that the segment belongs to
     body: Index  # (k,), material region number of that
     inner: Mask  # (k,), between two triangles: lines inside a body
@@ -184,10 +166,12 @@ class BoundaryTrace:
         view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
         nodes, degree, d = view.facets, max(1, mesh.GetCurveOrder()), view.dim
         curve = corners = view.vertices[nodes]
+        functions = nodes
         if order > 1:
-            nodes = cls._numbered(nodes, np.array([el.dofs for el in space.Elements(ng.BND)]))
+            functions = np.array([el.dofs for el in space.Elements(ng.BND)], dtype=np.intp)
+            nodes = cls._numbered(nodes, functions)
         if degree > 1:
-            places = cls._reference(degree)
+            places = list(zip(*cls.barycentric(cls.nodes_of(degree))[:-1], strict=True))
             rule = ng.IntegrationRule(places, [1.0] * len(places))
             curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))[:, :d]
             curve = curve.reshape(len(nodes), len(places), d)
@@ -203,6 +187,7 @@ class BoundaryTrace:
             geometry_order=degree,
             region=view.boundaries,
             nodes=nodes,
+            functions=functions,
             element=element,
             body=view.bodies[element],
             inner=view.inner_facets,
@@ -217,9 +202,14 @@ class BoundaryTrace:
         )
 
     @staticmethod
-    def _reference(degree: int) -> list[tuple[float, float, float]]:
-        """NGSolve's coordinates of the nodes of a degree."""
-        return [(1 - x, 0.0, 0.0) for x in gauss_lobatto(degree).tolist()]
+    def nodes_of(degree: int) -> Array:
+        """Parameters (q,) of the nodes of a curve of a degree."""
+        return gauss_lobatto(degree)
+
+    @staticmethod
+    def barycentric(s: Array) -> list[Array]:
+        """Both barycentric coordinates (...) of places `s` (...); the last is none of NGSolve's."""
+        return [1 - s, s]
 
     @staticmethod
     def _numbered(ends: Index, functions: Index) -> Index:
@@ -351,26 +341,39 @@ class BoundaryTrace:
         return self.lengths(segments)
 
     def nodal_basis(self, segments: Index) -> sp.csr_array:
-        """Matrix (n, n) from node values on `segments` (k,) and other unknowns to NGSolve's."""
-        order, size = self.order, self.space.ndof
-        if order == 1:
+        """Matrix (n, n) from unknowns at the nodes of `segments` (k,), and others, to NGSolve's."""
+        size, d = self.space.ndof, self.model.dim
+        if self.order == 1 or not len(segments):
             return sp.eye_array(size, format="csr")
-        nodes, axis = self.nodes[segments], self.axis[segments]
-        falling = nodes[:, 0] > nodes[:, -1]
-        nodes = np.where(falling[:, None], nodes[:, ::-1], nodes)
-        axis = np.where(falling, -axis, axis)
-        _, first = np.unique(nodes[:, 1], return_index=True)
-        nodes, axis = nodes[first], axis[first]
+        # Segments with a common edge have equal entries there: each function once.
+        functions = self.functions[segments, d:]
+        rows, at = np.unique(functions, return_index=True)
+        at, place = np.divmod(at, functions.shape[1])
+        entries = self._functions_by_unknowns(segments)[at, place]
+        kept = np.abs(entries) > ENTRY_ROUND_OFF
         count = np.ones(size + 1, dtype=np.int32)  # of entries in rows, of the identity but ...
-        count[0], count[nodes[:, 1:-1] + 1] = 0, order + 1
+        count[0], count[rows + 1] = 0, np.count_nonzero(kept, axis=1)
         starts = np.cumsum(count, dtype=np.int32)
         columns = np.repeat(np.arange(size, dtype=np.int32), count[1:])
         values = np.ones(len(columns))
-        places = starts[nodes[:, 1:-1]][:, :, None] + np.arange(order + 1)  # ... on edges
-        columns[places] = nodes[:, None]
-        for end in set(axis.tolist()):
-            values[places[axis == end]] = _edge_coefficients(order, end)
+        places = (starts[rows, None] + np.cumsum(kept, axis=1) - 1)[kept]  # ... there
+        columns[places], values[places] = self.nodes[segments[at]][kept], entries[kept]
         return sp.csr_array((values, columns, starts), (size, size))
+
+    def _functions_by_unknowns(self, segments: Index) -> Array:
+        """Coefficients (k, q, q) of NGSolve's functions but the first d, by unknowns at nodes.
+
+        Phi^-1, with Phi the functions at the nodes; the order of vertices decides which they are.
+        """
+        order = self.nodes[segments][:, self.corners].argsort(axis=1)[:, :2] @ [3, 1]
+        values = np.zeros((len(segments), *(self.nodes.shape[1],) * 2))
+        kind = 3 * order + self.axis[segments]
+        for one in set(kind.tolist()):
+            at = (kind == one).nonzero()[0]
+            shape = self.space.GetFE(ng.ElementId(ng.BND, int(segments[at[0]])))
+            points = zip(*self.barycentric(self.places(segments[at[:1]])[0])[:-1], strict=True)
+            values[at] = np.linalg.inv([shape.CalcShape(*x).NumPy() for x in points])
+        return values[:, self.model.dim :]
 
     def linear(self, segments: Index) -> sp.csr_array:
         """Functions of degree 1, (n, nv), by the nodes of `segments` (k,) and edge functions.
@@ -379,7 +382,8 @@ class BoundaryTrace:
         """
         n, vertices = self.space.ndof, self.mesh.nv
         size = self.model.dim
-        shares = self.unknowns_of_values(segments, self.barycentric(segments))
+        shares = np.stack(self.barycentric(self.places(segments)), axis=-1)
+        shares = self.unknowns_of_values(segments, shares)
         inner = self.nodes[segments] >= vertices
         rows, first = np.unique(self.nodes[segments][inner], return_index=True)
         rows = np.concatenate([np.arange(vertices), np.repeat(rows, size)])
@@ -387,11 +391,6 @@ class BoundaryTrace:
         columns = np.concatenate([np.arange(vertices), ends.ravel()])
         values = np.concatenate([np.ones(vertices), shares[inner][first].ravel()])
         return from_triplets(values, rows, columns, (n, vertices))
-
-    def barycentric(self, segments: Index) -> Array:
-        """Barycentric coordinates (k, order + 1, 2) of the nodes of `segments` (k,)."""
-        s = self.places(segments)
-        return np.stack([1 - s, s], axis=-1)
 
     def positions(self, segments: Index) -> Array:
         """The position as a function, (k, q, d): its unknowns at the q nodes of `segments` (k,)."""
@@ -420,10 +419,9 @@ class BoundaryTrace:
 
     @cached_property
     def curved_segments(self) -> Mask:
-        """Segments (k,) that leave their chords."""
-        ends = self.curve[:, :1], self.curve[:, -1:]
-        nodes = gauss_lobatto(self.geometry_order)[:, None]
-        off = np.abs(self.curve - ends[0] - nodes * (ends[1] - ends[0])).max(axis=(1, 2))
+        """Segments (k,) that leave their chords, facets the planes of their vertices."""
+        shares = np.stack(self.barycentric(self.nodes_of(self.geometry_order)), axis=-1)
+        off = np.abs(self.curve - shares @ self.curve[:, self.corners]).max(axis=(1, 2))
         return np.asarray(off > CURVED_DISTANCE * self.lengths(np.arange(len(self.curve))))
 
     @cached_property
@@ -439,13 +437,14 @@ class BoundaryTrace:
         return np.asarray(curved)
 
     @cached_property
-    def _middles(self) -> NDArray:
-        return self.mesh.MapToAllElements(ng.IntegrationRule([(0.5, 0, 0)], [1]), ng.BND)
+    def _corners(self) -> NDArray:
+        return self.mesh.MapToAllElements(ng.IntegrationRule([(0, 0, 0)], [1]), ng.BND)
 
     def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
         """Values (k, dim) of a CoefficientFunction at `s` (k,) of segments `segment` (k,)."""
-        points = self._middles[segment].copy()
-        points["x"] = 1 - s  # NGSolve's segment runs from the second vertex to the first
+        points = self._corners[segment]
+        for axis, x in zip("xyz", self.barycentric(s)[:-1], strict=False):
+            points[axis] = x
         return np.asarray(function(points)).reshape(len(segment), function.dim)
 
     def traction(self, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:

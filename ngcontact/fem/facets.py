@@ -11,21 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 import ngsolve as ng
 import numpy as np
-import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from ..arrays import Array, Index, Mask, from_triplets
+from ..arrays import Array, Index, Mask
 from ..mesh import CadEdge, CadFace, feet_on_faces
 from ..reference import triangle
-from .boundary import CURVED_DISTANCE, BoundaryTrace
+from .boundary import BoundaryTrace
 from .model import PLANE, SOLID_MODEL, Model
-
-ENTRY_ROUND_OFF = 1e-13  # of changes of basis, whose entries are of size 1: round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +36,14 @@ class FacetTrace(BoundaryTrace):
     vertices: ClassVar[Array] = np.eye(3)  # (3, 3)
 
     @staticmethod
-    def _reference(degree: int) -> list[tuple[float, float, float]]:
-        return [(x, y, 0.0) for x, y, _ in triangle.nodes(degree).tolist()]
+    def nodes_of(degree: int) -> Array:
+        """Barycentric coordinates (q, 3) of the nodes of a surface of a degree."""
+        return triangle.nodes(degree)
+
+    @staticmethod
+    def barycentric(s: Array) -> list[Array]:
+        """The three coordinates (...) that places `s` (..., 3) are given by."""
+        return list(np.moveaxis(s, -1, 0))
 
     @staticmethod
     def _numbered(ends: Index, functions: Index) -> Index:
@@ -89,8 +90,6 @@ class FacetTrace(BoundaryTrace):
     def places(self, segments: Index) -> Array:
         """Barycentric coordinates (k, q, 3) of the nodes of `segments` (k,)."""
         return np.broadcast_to(triangle.nodes(self.order), (len(segments), self.nodes.shape[1], 3))
-
-    barycentric = places
 
     def shapes(self, segment: Index, s: Array) -> Array:
         """Functions (k, q) of the unknowns at the nodes, at `s` (k, 3) of `segment` (k,)."""
@@ -140,65 +139,11 @@ class FacetTrace(BoundaryTrace):
         a, b, c = self.curve[segments, :3].transpose(1, 0, 2)
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
-    @cached_property
-    def curved_segments(self) -> Mask:
-        """Facets (k,) that leave the planes of their vertices."""
-        flat = np.einsum("qi,kid->kqd", triangle.nodes(self.geometry_order), self.curve[:, :3])
-        off = np.abs(self.curve - flat).max(axis=(1, 2))
-        return np.asarray(off > CURVED_DISTANCE * self.lengths(np.arange(len(self.curve))))
-
-    @cached_property
-    def _middles(self) -> NDArray:
-        return self.mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.BND)
-
-    def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
-        """Values (k, dim) of a CoefficientFunction at `s` (k, 3) of facets `segment` (k,)."""
-        points = self._middles[segment].copy()
-        points["x"], points["y"] = s[:, 0], s[:, 1]
-        return np.asarray(function(points)).reshape(len(segment), function.dim)
-
     def _grouped(self, segment: Index) -> Index:
         return self.region[segment]  # facets of one face after another
 
-    def nodal_basis(self, segments: Index) -> sp.csr_array:
-        """Matrix (n, n) from unknowns at the nodes of `segments` (k,), and others, to NGSolve's."""
-        size = self.space.ndof
-        if self.order == 1:
-            return sp.eye_array(size, format="csr")
-        inner = self.nodes[segments][:, 3:]
-        B = self.values_of_unknowns(segments)
-        change = np.linalg.solve(self._functions_at_nodes(segments), B)[:, 3:]
-        functions = self._functions[segments][:, 3:]
-        rows, columns = np.broadcast_arrays(functions[:, :, None], self.nodes[segments][:, None])
-        kept = np.abs(change) > ENTRY_ROUND_OFF
-        rows, columns, values = rows[kept], columns[kept], change[kept]
-        # Facets with a common edge have equal entries there.
-        _, first = np.unique(rows * size + columns, return_index=True)
-        rest = np.ones(size, dtype=bool)
-        rest[inner] = False
-        same = np.flatnonzero(rest)
-        return from_triplets(
-            np.concatenate([np.ones(len(same)), values[first]]),
-            np.concatenate([same, rows[first]]),
-            np.concatenate([same, columns[first]]),
-            (size, size),
-        )
-
-    @cached_property
-    def _functions(self) -> Index:
-        """NGSolve's unknowns (k, q) of each facet, in its order."""
-        return np.array([el.dofs for el in self.space.Elements(ng.BND)], dtype=np.intp)
-
-    def _functions_at_nodes(self, segments: Index) -> Array:
-        """Phi (k, q, q): NGSolve's functions at the nodes, which the order of vertices decides."""
-        order = np.argsort(self.nodes[segments][:, :3], axis=1) @ [9, 3, 1]
-        values = np.zeros((len(segments), *(self.nodes.shape[1],) * 2))
-        for kind in np.unique(order):
-            at = np.flatnonzero(order == kind)
-            shape = self.space.GetFE(ng.ElementId(ng.BND, int(segments[at[0]])))
-            points = triangle.nodes(self.order)[:, :2].tolist()
-            values[at] = np.array([shape.CalcShape(x, y, 0.0).NumPy() for x, y in points])
-        return values
+    def _functions_by_unknowns(self, segments: Index) -> Array:
+        return super()._functions_by_unknowns(segments) @ self.values_of_unknowns(segments)
 
 
 def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
