@@ -200,7 +200,7 @@ class _Frames:
 class _Supported:
     """Supports at n nodes of a mesh."""
 
-    nodes: Index  # (n,) their numbers in the mesh, rising
+    nodes: Index  # (n,) their numbers in the mesh, rising; few of it
     frames: _Frames  # whose first columns are the supported directions
     values: Array  # (n, d) prescribed along the columns
 
@@ -210,18 +210,14 @@ class _Supported:
         return np.arange(self.values.shape[1]) < self.frames.used[:, None]
 
 
-def _concerned(conditions: Conditions, rows: Rows) -> Index:
-    """Nodes (n,) that any condition or row concerns, rising: few of those of a mesh."""
-    return np.unique(np.append(conditions.node, rows.entries.node))
-
-
 def _axes(nodes: Index, d: int) -> Array:
     """Frames (n, d, d) along the axes at so many nodes."""
     return np.tile(np.eye(d), (len(nodes), 1, 1))
 
 
-def _supported(nodes: Index, c: Conditions) -> _Supported:
-    """The supports at the `nodes` (n,) that the conditions `c` make."""
+def _supported(c: Conditions, rows: Rows) -> _Supported:
+    """The supports that conditions make at the nodes that any of them, or a row, concerns."""
+    nodes = np.unique(np.append(c.node, rows.entries.node))
     d, node = c.direction.shape[1], np.searchsorted(nodes, c.node)
     frames = _Frames(_axes(nodes, d), np.zeros(len(nodes), dtype=np.intp))
     values, slot = np.zeros((len(nodes), d)), frames.take(node, c.direction)
@@ -331,7 +327,7 @@ def held_rows(conditions: Conditions, rows: Rows, length: float) -> Mask:
     ValueError
         Prescribed displacements on both sides violate a row; an overlap as drawn is none here.
     """
-    m, supported = len(rows.node), _supported(_concerned(conditions, rows), conditions)
+    m, supported = len(rows.node), _supported(conditions, rows)
     e, free = _in_frames(rows, supported)
     size = np.linalg.norm(free.coefficient, axis=1)
     own = rows.entries.node == rows.node[e.row]
@@ -358,13 +354,14 @@ def change_of_basis(
         Prescribed displacements on both sides violate a row, or rows depend on each other.
     """
     (m, n), d = rows.coupling.shape, rows.direction.shape[1]
-    nodes = _concerned(conditions, rows)  # k of them, by whose numbers all but T counts
+    supported = _supported(conditions, rows)
+    nodes = supported.nodes  # k of them, by whose numbers all but T counts
     components = (nodes + n * np.arange(d)[:, None]).ravel()  # theirs among those of all nodes
-    supported = _supported(nodes, conditions)
     frame, fixed = supported.frames.columns, supported.fixed
     e, free = _in_frames(rows, supported)
     taken = _Frames(_axes(nodes, d), supported.frames.used.copy())
-    host, slot, local = _hosts(_preferred(rows, nodes, stiffness), free, taken)
+    preferred = _preferred(rows, nodes, stiffness)
+    host, slot, local = _hosts(preferred, free, taken)
     kept = (host >= 0).nonzero()[0]
     _check_prescribed(rows, e, supported, (host < 0).nonzero()[0], length)
     M = taken.columns.transpose(0, 2, 1).copy()
@@ -382,12 +379,13 @@ def change_of_basis(
     of_row[unknown[kept]] = True
     if of_row[column].any():  # unknowns of other rows
         right = from_triplets(value, row, column, (m, components.size))
-        most = RING_CONDITION if stiffness is None else SOFT_CONDITION
+        in_front = (nodes[preferred] != rows.node).any()
+        most = SOFT_CONDITION if in_front else RING_CONDITION
         Y = _without_links(right[:, unknown].tocsr(), right, most)
-        if Y is None and stiffness is None:
-            raise ValueError(f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}")
-        if Y is None:
+        if Y is None and in_front:
             return change_of_basis(conditions, rows, length)  # the secondary hosts all
+        if Y is None:
+            raise ValueError(f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}")
         Y = Y.tocoo()
         row, column, value = Y.row, Y.col, Y.data
     column, unknown = components[column], components[unknown]
