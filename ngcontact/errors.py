@@ -55,18 +55,14 @@ class NoEquilibriumError(ContactError):
     ----------
     message
         The body, the motion, the work and what would hold the body.
-    body
-        Name of the body that is driven away.
     motion
-        The rigid motion, as the raising function describes it.
+        The rigid motion, of the `bodies` that it names; the first is the error's `body`.
     work
         Work of the load on that motion (any consistent units).
     """
 
-    def __init__(
-        self, message: str, *, body: str = "", motion: Any = None, work: float = float("nan")
-    ) -> None:
+    def __init__(self, message: str, *, motion: Any, work: float) -> None:
         super().__init__(message)
-        self.body = body
+        self.body: str = motion.bodies[0]
         self.motion = motion
         self.work = work

@@ -30,7 +30,7 @@ from ..linalg import (
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
-from ..problem import Problem, varies
+from ..problem import Elastic, Hooke, Problem, varies
 from ..qp import BorderedSystems, Iterate, QuadraticProgram, SingularError, minimise, no_null_space
 from .admissible_set import (
     AdmissibleSet,
@@ -159,18 +159,14 @@ def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
 
 def same_stiffness(problem: Problem, other: Problem) -> bool:
     """Whether two problems have the same elastic bodies; functions may have changed unseen."""
+
+    def data(law: Elastic | Hooke) -> list[Any]:
+        return [type(law), *(np.asarray(value).tolist() for value in vars(law).values())]
+
     laws, others = problem.materials, other.materials
-    return (
-        problem.model == other.model
-        and laws.keys() == others.keys()
-        and not any(map(varies, [*laws.values(), *others.values()]))
-        and all(type(law) is type(others[body]) for body, law in laws.items())
-        and all(
-            np.array_equal(value, vars(others[body])[name])
-            for body, law in laws.items()
-            for name, value in vars(law).items()
-        )
-    )
+    if problem.model != other.model or any(map(varies, [*laws.values(), *others.values()])):
+        return False
+    return {k: data(law) for k, law in laws.items()} == {k: data(law) for k, law in others.items()}
 
 
 def same_basis(one: BasisTransformation, other: BasisTransformation) -> bool:

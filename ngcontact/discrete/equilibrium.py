@@ -269,7 +269,6 @@ class Rigid:
                     f"by {seen:.3g} only, and the load does the work {work:.6g}; give that body as "
                     "secondary, hold it by `displacement` or `sliding`, or draw it where the load "
                     "presses it",
-                    body=motion.bodies[0],
                     motion=motion,
                     work=work,
                 )
@@ -395,7 +394,6 @@ def _concentrated(
         f"an end of its zone, at {_described(trace.positions(np.array([segment]))[0, place])}: a "
         "force at a point, in space along an edge, has infinite energy, which no mesh resolves; "
         "move the load towards the zone, or hold that body by `displacement` or `sliding`",
-        body=words.bodies[0],
         motion=words,
         work=0.0,
     )
@@ -420,7 +418,6 @@ def _check_work(
             f"no equilibrium: the load does the work {done:.6g} on a rigid {motion}, which "
             "neither supports nor contact resist; hold that body by `displacement`, `sliding` or "
             "a contact pair, or balance the load",
-            body=motion.bodies[0],
             motion=motion,
             work=done,
         )

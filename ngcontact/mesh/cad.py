@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -131,13 +132,20 @@ def _edges(geometry: OCCGeometry) -> list[CadEdge]:
 
 def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
     """CAD edges by boundary region number, or None for solids and without an OCC geometry."""
+    return None if mesh.dim != 2 else drawn_sides(mesh, _edges)
+
+
+def drawn_sides(mesh: ng.Mesh, made: Callable[[OCCGeometry], list[Any]]) -> list[Any] | None:
+    """What is `made` of a mesh's OCC geometry, by boundary region number; None where names differ.
+
+    Or without one.
+    """
     geometry = mesh.ngmesh.GetGeometry()
-    if not isinstance(geometry, OCCGeometry) or mesh.dim != 2:
+    if not isinstance(geometry, OCCGeometry):
         return None
-    edges, names = _edges(geometry), mesh.GetBoundaries()
-    if [edge.name or "default" for edge in edges] != [name or "default" for name in names]:
-        return None
-    return edges
+    sides, names = made(geometry), mesh.GetBoundaries()
+    alike = [side.name or "default" for side in sides] == [name or "default" for name in names]
+    return sides if alike else None
 
 
 def same_geometry(one: OCCGeometry | ng.Mesh, other: OCCGeometry | ng.Mesh) -> bool:

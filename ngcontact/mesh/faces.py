@@ -16,7 +16,7 @@ from netgen.occ import OCCGeometry, TopoDS_Shape
 
 from ..arrays import NEWTON_STEPS, Array, Index, Mask
 from ..problem import MeshArrays
-from .cad import cad_edges
+from .cad import cad_edges, drawn_sides
 
 # Step on the surface, relative to the coordinates, at which Newton has arrived.
 NEWTON_TOLERANCE = 1e-15
@@ -82,13 +82,7 @@ def _faces(geometry: OCCGeometry) -> list[CadFace]:
 
 def cad_faces(mesh: ng.Mesh) -> list[CadFace] | None:
     """CAD faces by boundary region number, or None for a mesh without an OCC geometry."""
-    geometry = mesh.ngmesh.GetGeometry()
-    if not isinstance(geometry, OCCGeometry):
-        return None
-    faces, names = _faces(geometry), mesh.GetBoundaries()
-    if [face.name or "default" for face in faces] != [name or "default" for name in names]:
-        return None
-    return faces
+    return drawn_sides(mesh, _faces)
 
 
 def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Array, bool]]:
