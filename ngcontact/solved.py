@@ -135,7 +135,7 @@ class Solved:
     def nodal_reaction(self) -> Array:
         """Forces (n, d) of the supports on the nodes, force per thickness, A u - f + B' force."""
         d, space = self.discrete, self.discrete.space
-        internal = space.A @ self.displacement.vec.FV().NumPy()
+        internal = space.A @ space.unknowns(self.displacement)
         residual = internal - space.condensed(space.right_side)
         nodal = space.basis.T @ residual + d.rows.matrix.T @ self.force
         return nodal.reshape(self.problem.dim, -1).T

@@ -136,6 +136,9 @@ def test_a_guide_on_a_circle_holds_the_exact_normal(order):
 
 
 READ = {
+    "energy": lambda s, folder: s.energy,
+    "reactions": lambda s, folder: s.reactions,
+    "stress_free": lambda s, folder: s.stress_free,
     "indicators": lambda s, folder: s.indicators,
     "error_estimate": lambda s, folder: s.error_estimate,
     "error_bound": lambda s, folder: s.error_bound,

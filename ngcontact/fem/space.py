@@ -88,9 +88,14 @@ class Space:
 
     def terms(self, displacement: ng.GridFunction) -> float:
         """Root of the sum of squares whose differences the energy of a displacement is."""
-        u = displacement.vec.FV().NumPy()
+        u = self.unknowns(displacement)
         size = power_of_two(u)  # squares must stay in range
         return size * float(np.sqrt(self.diagonal @ (u / size) ** 2))
+
+    def unknowns(self, displacement: ng.GridFunction) -> Array:
+        """The unknowns (2N,) of a displacement, of a mesh that is as it was."""
+        self.require_mesh()
+        return np.asarray(displacement.vec.FV().NumPy())
 
     def require_mesh(self) -> None:
         """Raise a RuntimeError where the mesh was changed in place, so that no data fit it."""
@@ -253,7 +258,7 @@ def potential_energy(problem: Problem, space: Space, displacement: ng.GridFuncti
     the loads; in plane strain without E e0_zz^2 / 2, a constant that bars normal to the plane hold.
     """
     size, energy = _scaled_energy(problem, space, displacement)
-    work = float(space.f / size @ (displacement.vec.FV().NumPy() / size))
+    work = float(space.f / size @ (space.unknowns(displacement) / size))
     return (energy / 2 - work) * size * size  # (2.6)
 
 
@@ -273,13 +278,12 @@ def _scaled_energy(
 
     From the strains where large rigid motions would cancel, and where there are initial ones.
     """
-    u, mesh, order = displacement.vec.FV().NumPy(), space.trace.mesh, space.trace.order
+    u, mesh, order = space.unknowns(displacement), space.trace.mesh, space.trace.order
     size = power_of_two(u)
     if space.initial is None:
         energy = space.energy(u / size)
         if energy > CANCELLED_ENERGY * float(space.diagonal @ (u / size) ** 2):
             return size, energy
-    space.require_mesh()
     model, energy = model_of(problem), 0.0
     e = elastic_strain(problem, displacement) / size
     for body, law in problem.materials.items():
