@@ -119,9 +119,7 @@ def _mesh_of(file: Any) -> ng.Mesh:
         mesh.AddElements(1, k, np.ascontiguousarray(ends, dtype=np.int32))
         mesh.SetBCName(k - 1, run[0].name)
         if curves:
-            edge = mesh.EdgeDescriptor(k)
-            edge.edgenr, edge.domin, edge.domout = k, run[0].body + 1, 0
-            edge.surfnr = run[0].body + 1, 0
+            mesh.EdgeDescriptor(k).edgenr = k
     if curves:
         mesh.SetGeometry(occ.OCCGeometry(occ.Compound(curves), dim=2))
     found = ng.Mesh(mesh)
