@@ -35,10 +35,7 @@ def power_of_two(values: Array) -> float:
 
 
 def root_of_squares(values: Array) -> float:
-    """Root of the sum of squares of `values` (...,), in their unit.
-
-    The squares may be too large or too small for a float.
-    """
+    """Root of the sum of squares of `values` (...,), which may leave the range of numbers."""
     unit = power_of_two(values)
     return unit * float(np.sqrt(((values / unit) ** 2).sum()))
 
@@ -86,10 +83,7 @@ def joined(records: Sequence[Record]) -> Record:
 
 
 def paths(links: Index, count: int) -> list[Index]:
-    """Numbers (j,) of points along each of the curves that `links` (l, 2) make of `count` points.
-
-    A closed one ends where it starts.
-    """
+    """Each curve of `links` (l, 2), numbers (j,) of points; a closed one ends where it starts."""
     graph = from_triplets(np.ones(len(links)), links[:, 0], links[:, 1], (count, count))
     degree = np.bincount(links.ravel(), minlength=count)
     _, part = connected_components(graph, directed=False)

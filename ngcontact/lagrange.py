@@ -75,18 +75,12 @@ def lagrange_derivative(order: int, s: Array) -> Array:
 
 
 def at(curve: Array, segment: Index, s: Array) -> Array:
-    """Points (k, 2) at `s` (k,) of segments `segment` (k,) of `curve` (q, p + 1, 2).
-
-    That is given by its points at the Gauss-Lobatto parameters.
-    """
+    """Points (k, 2) at `s` (k,) of segments `segment` (k,) of `curve` (q, p + 1, 2), by nodes."""
     return (lagrange(curve.shape[1] - 1, s)[:, None] @ curve[segment])[:, 0]
 
 
 def slope(curve: Array, segment: Index, s: Array) -> Array:
-    """Derivatives (k, 2) of the same with respect to s.
-
-    At `s` (k,) of the curves `segment` (k,) among those through the points `curve` (n, p + 1, 2).
-    """
+    """Derivatives (k, 2) of the same, at `s` (k,) of `segment` (k,) of `curve` (q, p + 1, 2)."""
     return (lagrange_derivative(curve.shape[1] - 1, s)[:, None] @ curve[segment])[:, 0]
 
 
@@ -123,10 +117,7 @@ def zeros(order: int, values: Array) -> tuple[Index, Array]:
 
 @lru_cache
 def gauss_derivative(order: int) -> Array:
-    """Matrix (k, k) from values at the k points of `gauss` to the derivatives there.
-
-    Of the polynomial through them, on [0, 1].
-    """
+    """Matrix (k, k) from values of polynomials at the k points of `gauss` to derivatives there."""
     points = 2 * gauss(order)[0] - 1
     degree = len(points) - 1
     derivatives = 2 * legendre.legder(np.eye(degree + 1))  # of Legendre's polynomials

@@ -83,9 +83,7 @@ def _from_apex(polygon: Array, count: Index) -> tuple[Array, Index]:
 
 
 def clipped(polygon: Array) -> tuple[Array, Index]:
-    """Triangles `polygon` (r, 3, 3) in barycentric coordinates, cut to the facet.
-
-    By Sutherland and Hodgman.
+    """Triangles `polygon` (r, 3, 3), barycentric, cut to the facet by Sutherland and Hodgman.
 
     Corners (r, 7, 3) of convex polygons, of which the first (r,) count.
     """

@@ -309,10 +309,7 @@ def opposite_segments(
 
 
 def distances(trace: BoundaryTrace, line: ContactLine) -> Array:
-    """Distance (k,) of what faces the nodes of each segment; the largest where none is known.
-
-    Infinite along a direction.
-    """
+    """Distance (k,) of what faces nodes of segments, else the largest; inf along a direction."""
     if line.contact.direction is not None:
         return np.full(len(line.segments), np.inf)
     met = np.flatnonzero(line.partner >= 0)

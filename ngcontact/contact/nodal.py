@@ -32,10 +32,7 @@ BULGE_DIFFERENCE = 0.0125
 def prescribed_gap(
     contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
-    """Values (k,) of `Contact.gap`, lengths, at points of the secondary.
-
-    They lie at `s` (k,) of segments `segment` (k,), which is `position` (k, d).
-    """
+    """Values (k,) of `Contact.gap` at `s` (k,) of segments `segment` (k,), at `position` (k, d)."""
     if isinstance(contact.gap, ng.CoefficientFunction):
         return trace.evaluate(contact.gap, segment, s)[:, 0]
     if callable(contact.gap):

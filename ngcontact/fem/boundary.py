@@ -159,10 +159,7 @@ class BoundaryTrace:
     def of(
         cls, mesh: ng.Mesh, order: int, model: Model, bernstein: Mask | None = None
     ) -> BoundaryTrace:
-        """Trace of the displacements of degree `order` on the boundary of a mesh, in a model.
-
-        Unknowns at nodes `bernstein` (n,), none when left out, are Bernstein coefficients.
-        """
+        """The trace of a mesh; unknowns at nodes `bernstein` (n,) are Bernstein coefficients."""
         view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
         nodes, degree, d = view.facets, max(1, mesh.GetCurveOrder()), view.dim
         curve = corners = view.vertices[nodes]
@@ -208,7 +205,7 @@ class BoundaryTrace:
 
     @staticmethod
     def barycentric(s: Array) -> list[Array]:
-        """Both barycentric coordinates (...) of places `s` (...); the last is none of NGSolve's."""
+        """Both barycentric coordinates (k,) of places `s` (k,); NGSolve knows the first."""
         return [1 - s, s]
 
     @staticmethod
@@ -227,18 +224,12 @@ class BoundaryTrace:
         return slope(self.curve, segment, s)
 
     def area_vector(self, segment: Index, s: Array) -> Array:
-        """Outward normals (k, 2) with the length of dx/ds, times the measure of the body.
-
-        At `s` (k,) of segments `segment` (k,).
-        """
+        """Outward normals (k, 2) as long as dx/ds times `measure` at `s` (k,) of `segment` (k,)."""
         vectors = -across(self.derivative(segment, s)) * self.side[segment, None]
         return vectors * self.measure(segment, s)[:, None] if self.model.extent else vectors
 
     def surface_element(self, segment: Index, s: Array) -> Array:
-        """Size of the body (k,) per unit weight of a rule, at `s` (k,) of segments `segment` (k,).
-
-        Of lengths, or areas, times the measure of the body.
-        """
+        """Size (k,) of the body, per unit weight of a rule, at `s` (k,) of `segment` (k,)."""
         return np.linalg.norm(self.area_vector(segment, s), axis=1)
 
     def rule(self, degree: int) -> tuple[Array, Array]:
@@ -252,12 +243,7 @@ class BoundaryTrace:
     def _feet(
         self, segment: Index, points: Array, s: Array
     ) -> Iterator[tuple[CadEdge | CadFace, Index | Mask, Array, bool]]:
-        """CAD curves or faces of segments `segment` (k,), and feet on them; none without CAD.
-
-        With each which (k,) are its segments, a mask or numbers (j,), parameters (j, ...) of the
-        feet of `points` (k, d), near `s` (k,), and whether it is straight or plane: one parameter
-        does then.
-        """
+        """CAD curves or faces, and feet of `points` (k, d) near `s` (k,), as of `feet_on_faces`."""
         regions, edges = self.region[segment], self.edges or []
         for region in set(regions.tolist()) if edges else ():
             edge, here = edges[region], regions == region
@@ -265,10 +251,7 @@ class BoundaryTrace:
             yield edge, here, t, edge.straight
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """Normals (k, d) of the CAD curves or faces, at `s` (k,) of segments `segment` (k,).
-
-        Of the mesh without CAD.
-        """
+        """Normals (k, d) of CAD, without it of the mesh, at `s` (k,) of segments `segment` (k,)."""
         normals = self.normal(segment, s)
         for drawn, here, t, _ in self._feet(segment, self.point(segment, s), s):
             exact = drawn.normal_at(t)
@@ -376,10 +359,7 @@ class BoundaryTrace:
         return values[:, self.model.dim :]
 
     def linear(self, segments: Index) -> sp.csr_array:
-        """Functions of degree 1, (n, nv), by the nodes of `segments` (k,) and edge functions.
-
-        These add to them.
-        """
+        """Functions of degree 1, (n, nv), by nodes of `segments` (k,); those of edges add."""
         n, vertices = self.space.ndof, self.mesh.nv
         size = self.model.dim
         shares = np.stack(self.barycentric(self.places(segments)), axis=-1)
@@ -448,10 +428,7 @@ class BoundaryTrace:
         return np.asarray(function(points)).reshape(len(segment), function.dim)
 
     def traction(self, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
-        """Traction sigma n (k, d) of a `stress` (d, d), by normals of the mesh.
-
-        At `s` (k,) of segments `segment` (k,).
-        """
+        """Traction (k, d) of a `stress` (d, d), by the mesh, at `s` (k,) of `segment` (k,)."""
         sigma = self.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s)
         normal = self.normal(segment, s)
         return (sigma.reshape(*normal.shape, normal.shape[1]) @ normal[:, :, None])[..., 0]

@@ -42,7 +42,7 @@ class FacetTrace(BoundaryTrace):
 
     @staticmethod
     def barycentric(s: Array) -> list[Array]:
-        """The three coordinates (...) that places `s` (..., 3) are given by."""
+        """Barycentric coordinates (k,) of places `s` (k, 3), which are given by these."""
         return list(np.moveaxis(s, -1, 0))
 
     @staticmethod
@@ -65,10 +65,7 @@ class FacetTrace(BoundaryTrace):
         return np.einsum("kij,kid->kdj", weights, self.curve[segment])
 
     def area_vector(self, segment: Index, s: Array) -> Array:
-        """Outward normals (k, 3) with the length of an area per unit weight of `triangle.gauss`.
-
-        At `s` (k, 3) of facets `segment` (k,).
-        """
+        """Outward normals (k, 3), areas per weight of `rule`, at `s` (k, 3) of `segment` (k,)."""
         tangents = self.derivative(segment, s)
         vectors = np.cross(tangents[..., 0], tangents[..., 1]) / 2
         return np.asarray(vectors * self.side[segment, None])

@@ -96,9 +96,7 @@ def _moduli(C: Array) -> Array:
 
 
 def contact_modulus(problem: Problem, mesh: ng.Mesh, *sides: Index) -> float:
-    """E*, a stress: 1 / E* is the sum of (1 - nu^2) / E, in the mean over each side.
-
-    In plane stress of 1 / E.
+    """E*, a stress: 1 / E* is the sum over sides of mean (1 - nu^2) / E, in plane stress 1 / E.
 
     The sides are elements (k,); one without any is rigid. Of laws that are not isotropic the
     modulus of shear and the bulk modulus of `Moduli` count.

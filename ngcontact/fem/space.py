@@ -121,10 +121,7 @@ def model_of(problem: Problem) -> Model:
 
 
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
-    """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default.
-
-    Where that misses a part of a load, with the load's moments.
-    """
+    """f(v) of (3.2), (2N,), by rules `bonus` orders above the default, or by moments of a load."""
     v, model, mesh = V.TestFunction(), model_of(problem), V.mesh
     f = ng.LinearForm(V)
     for load in loads_of(problem, mesh):
@@ -345,10 +342,7 @@ def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.Coef
 
 
 def von_mises(stress: Array) -> Array:
-    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units.
-
-    Of solids yz and xz follow, (k, 6).
-    """
+    """Von Mises stress (k,) of `stress` (k, 4), xx, yy, xy, zz, of solids yz, xz, too, (k, 6)."""
     size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
     xx, yy, xy, zz, *others = stress.T / size
     shear = sum((other**2 for other in others), xy**2)

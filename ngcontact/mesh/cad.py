@@ -136,10 +136,7 @@ def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
 
 
 def drawn_sides(mesh: ng.Mesh, made: Callable[[OCCGeometry], list[Any]]) -> list[Any] | None:
-    """What is `made` of a mesh's OCC geometry, by boundary region number; None where names differ.
-
-    Or without one.
-    """
+    """What is `made` of a mesh's geometry, by boundary region; None without, or of other names."""
     geometry = mesh.ngmesh.GetGeometry()
     if not isinstance(geometry, OCCGeometry):
         return None

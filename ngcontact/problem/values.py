@@ -60,10 +60,7 @@ def scalar_data(value: Any, what: str) -> float | ng.CoefficientFunction:
 def refuse_where(
     points: np.ndarray, bad: np.ndarray, values: np.ndarray, what: str, right: str
 ) -> None:
-    """Raise `ValueError` for the first of mesh `points` (n,) that is `bad` (n,), naming the place.
-
-    And its value: `values` (n, ...).
-    """
+    """Refuse the first of mesh `points` (n,) that is `bad` (n,), with its of `values` (n, ...)."""
     if bad.any():
         first = int(np.argmax(bad))
         x = ng.CF((ng.x, ng.y, ng.z))(points)

@@ -40,10 +40,7 @@ Integrand = Callable[[Index, Array], Array]  # values (k, m, c) at (k, m, dim) o
 
 @lru_cache
 def parts(dim: int, n: int) -> tuple[Array, Array]:
-    """The k = n^dim equal parts of the unit segment or triangle.
-
-    Origins (k, dim), and sides (k, dim, dim) as rows.
-    """
+    """The k = n^dim equal parts of the unit simplex: origins (k, dim), sides (k, dim, dim)."""
     if dim == 1:
         return np.arange(n)[:, None] / n, np.full((n, 1, 1), 1 / n)
     i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
@@ -383,10 +380,7 @@ class SampledElements:
     def integral(
         self, density: ng.CoefficientFunction, elements: Index, rough: Mask | None = None
     ) -> tuple[Array, Array]:
-        """Integral (c,) over `elements` (k,), and the error (c,) that is measured of it.
-
-        Those that are `rough` (n,) begin in parts.
-        """
+        """Integral (c,) over `elements` (k,), and its error (c,); `rough` (n,) begin in parts."""
         fine = np.zeros(len(elements), dtype=bool) if rough is None else rough[elements]
 
         def values(elements: Index, reference: Array) -> Array:

@@ -124,10 +124,7 @@ def _functions(problem: Problem) -> Iterator[Datum]:
 
 
 def features_of(problem: Problem, mesh: ng.Mesh, *, again: bool = False) -> list[Features]:
-    """Features of all functions of a problem from their last sampling, if there was one.
-
-    Each run looks at them `again`: parameters may have changed.
-    """
+    """Features of all functions of a problem, of their last sampling unless looked at `again`."""
     found = []
     for datum in _functions(problem):
         known = FOUND.setdefault(datum.owner, {})
