@@ -11,7 +11,7 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Index, Mask
-from .contact import ContactState, contact_states, curves_at_ends, signed_distance, state_of
+from .contact import ContactState, by_line, curves_at_ends, signed_distance, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .fem import (
     FacetTrace,
@@ -78,7 +78,9 @@ class Solved:
         """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
         program = self.discrete.program
         gap = program.g - self.minimiser.u[program.unknown]  # (3.9), (3.9')
-        return contact_states(self.discrete.lines, gap, self.force, self.active)
+        lines = self.discrete.lines
+        parts = by_line(lines, gap), by_line(lines, self.force), by_line(lines, self.active)
+        return [ContactState(*of_line) for of_line in zip(lines, *parts, strict=True)]
 
     @cached_property
     def points(self) -> Array:

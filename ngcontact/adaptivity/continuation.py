@@ -96,10 +96,7 @@ class TransferredForecast(Forecast):
 
 
 def _inside(places: Array, inside: Index, corners: Array, parent: Index) -> Index:
-    """The element (n,) with `corners` (k, 3, 2) in which, or nearest, each of the `places` lies.
-
-    Of the parts, by `parent` (k,), of the element `inside` (n,) it lies in.
-    """
+    """The parts (n,) of elements `inside` (n,) in which, or nearest to which, places (n, 2) lie."""
     order, count = np.argsort(parent, kind="stable"), np.bincount(parent)
     first = np.cumsum(count) - count
     found, deepest = order[first[inside]], np.full(len(inside), -math.inf)

@@ -32,7 +32,6 @@ from .search import FoundContact as FoundContact
 from .search import find_contacts as find_contacts
 from .state import ContactState as ContactState
 from .state import Transitions as Transitions
-from .state import contact_states as contact_states
 from .state import ending_segments as ending_segments
 from .state import state_of as state_of
 from .state import transitions_on as transitions_on

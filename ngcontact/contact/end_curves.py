@@ -133,10 +133,7 @@ def curves_at_ends(zone: SignedDistance) -> list[Array]:
 
 
 def area_in_contact(zone: SignedDistance, state: ContactState) -> float:
-    """Area of the secondary's surface that is in contact, before deformation.
-
-    Of facets that face the primary in part, the share that faces it.
-    """
+    """Area in contact of the parts that face the primary, on the secondary before deformation."""
     parts, nodes = triangle.parts(zone.trace.order), triangle.nodes(zone.trace.order)
     some = np.flatnonzero((zone.value > 0).any(axis=1))
     f = _filled(zone.value[some])[:, parts]

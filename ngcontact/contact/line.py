@@ -52,10 +52,7 @@ class ContactLine:
         return int(self.position.shape[1])
 
     def on_segments(self, values: NDArray[Any], missing: Any) -> NDArray[Any]:
-        """Values (k, q) at the nodes of segments, of `values` (m,) at points, `missing` without.
-
-        Of vectors `values` (m, d) vectors (k, q, d).
-        """
+        """Values (k, q) at nodes, of `values` (m,), of vectors (k, q, d); `missing` without."""
         last = np.full((1, *values.shape[1:]), missing, values.dtype)
         return np.asarray(np.concatenate([values, last])[self.rows])
 

@@ -41,10 +41,7 @@ def prescribed_gap(
 
 
 def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Size (P1) or eta (P2) per unit weight of a rule, (k,), at `s` (k,) of `segment` (k,).
-
-    Times the measure of the model.
-    """
+    """Size (P1) or eta (P2) of the body per weight, (k,), at `s` (k,) of `segment` (k,)."""
     if contact.direction is None:
         return trace.surface_element(segment, s)
     return np.abs(trace.area_vector(segment, s) @ np.array(contact.direction))

@@ -68,10 +68,7 @@ def _bend(curve: Array) -> tuple[Array, Array]:
 
 
 def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Array]:
-    """Pairs (2, r) of point and segment whose lines cross it, once for each crossing, and s (r,).
-
-    Lines through `points` (k, 2) with the normals `normal` (k, 2).
-    """
+    """Pairs (2, r) of point and segment whose lines cross it, once a crossing, and s (r,)."""
     ends = curve[:, [0, -1]]
     slack = MATCHING_DISTANCE * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     bend, turn = _bend(curve)

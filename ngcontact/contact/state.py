@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask, distances_along
 from ..fem import ORDERS, Model
-from .line import ContactLine, by_line, in_contact, links, twins
+from .line import ContactLine, in_contact, links, twins
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -234,14 +234,6 @@ def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array
             fit = np.linalg.lstsq(root[:, None] * powers, root * pressure[near], rcond=None)[0]
             pressure[i] = fit[0]
     return pressure
-
-
-def contact_states(
-    lines: Sequence[ContactLine], gap: Array, force: Array, active: Mask
-) -> list[ContactState]:
-    """The state of each line; `gap`, `force` and `active` (m,) are over the points of all."""
-    parts = by_line(lines, gap), by_line(lines, force), by_line(lines, active)
-    return [ContactState(*of_line) for of_line in zip(lines, *parts, strict=True)]
 
 
 def state_of(states: Sequence[ContactState], pair: int) -> ContactState:

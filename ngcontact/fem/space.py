@@ -260,10 +260,7 @@ def potential_energy(problem: Problem, space: Space, displacement: ng.GridFuncti
 
 
 def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
-    """A(u_h, u_h)^(1/2), root of an energy per unit thickness; of e(u_h) - e0 with initial strains.
-
-    So it is the norm of the stress.
-    """
+    """A(u_h, u_h)^(1/2), root of an energy: the norm of the stress, also with initial strains."""
     size, energy = _scaled_energy(problem, space, displacement)
     return math.sqrt(energy) * size
 

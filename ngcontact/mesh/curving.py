@@ -22,10 +22,7 @@ SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced fr
 
 
 def vertex_parents(mesh: ng.Mesh) -> Integers:
-    """Ends of the edges that refinement halved, (nv, 2); -1 for vertices of the first mesh.
-
-    Both have lower numbers than the vertex itself.
-    """
+    """Ends (nv, 2) of edges that refinement halved, numbered before; -1 of first vertices."""
     kept: Integers = getattr(mesh, PARENTS, np.zeros((0, 2), dtype=np.int32))
     known = len(kept)
     if known > mesh.nv:  # another mesh has been loaded into this one

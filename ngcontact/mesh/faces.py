@@ -86,11 +86,7 @@ def cad_faces(mesh: ng.Mesh) -> list[CadFace] | None:
 
 
 def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Array, bool]]:
-    """CAD faces that have some of the `facets` (n,); none without CAD.
-
-    With each the positions (k,) of its facets in `facets`, parameters (k, 3, 2) of their corners,
-    and whether it is plane.
-    """
+    """CAD faces, positions (k,) of their facets, parameters (k, 3, 2) of corners, and if plane."""
     faces, view = cad_faces(mesh) or [], MeshArrays(mesh)
     region, uv = view.boundaries, view.surface_parameters
     for number in np.unique(region[facets]) if faces else ():
