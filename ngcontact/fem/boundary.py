@@ -349,14 +349,14 @@ class BoundaryTrace:
         Phi^-1, with Phi the functions at the nodes; the order of vertices decides which they are.
         """
         order = self.nodes[segments][:, self.corners].argsort(axis=1)[:, :2] @ [3, 1]
-        values = np.zeros((len(segments), *(self.nodes.shape[1],) * 2))
-        kind = 3 * order + self.axis[segments]
-        for one in set(kind.tolist()):
-            at = (kind == one).nonzero()[0]
-            shape = self.space.GetFE(ng.ElementId(ng.BND, int(segments[at[0]])))
-            points = zip(*self.barycentric(self.places(segments[at[:1]])[0])[:-1], strict=True)
-            values[at] = np.linalg.inv([shape.CalcShape(*x).NumPy() for x in points])
-        return values[:, self.model.dim :]
+        kind = (3 * order + self.axis[segments]).tolist()
+        found, values = {k: i for i, k in enumerate(kind)}, []  # a segment of each kind
+        for i in segments[list(found.values())]:
+            shape = self.space.GetFE(ng.ElementId(ng.BND, int(i)))
+            points = zip(*self.barycentric(self.places(i[None])[0])[:-1], strict=True)
+            values.append([shape.CalcShape(*x).NumPy() for x in points])
+        number = {k: n for n, k in enumerate(found)}
+        return np.linalg.inv(values)[[number[k] for k in kind], self.model.dim :]
 
     def linear(self, segments: Index) -> sp.csr_array:
         """Functions of degree 1, (n, nv), by nodes of `segments` (k,); those of edges add."""

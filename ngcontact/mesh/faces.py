@@ -97,8 +97,9 @@ def _by_face(mesh: ng.Mesh, facets: Index) -> Iterator[tuple[CadFace, Index, Arr
 def curved_facets(mesh: ng.Mesh) -> Mask:
     """Facets (k,) of curved CAD faces, in the plane of curved edges."""
     if mesh.dim == 2:
-        bent = [k for k, edge in enumerate(cad_edges(mesh) or ()) if not edge.straight]
-        return np.isin(MeshArrays(mesh).boundaries, bent)
+        region = MeshArrays(mesh).boundaries
+        bent = np.array([not edge.straight for edge in cad_edges(mesh) or ()])
+        return bent[region] if bent.any() else np.zeros(len(region), dtype=bool)
     curved = np.zeros(mesh.GetNE(ng.BND), dtype=bool)
     for _, at, _, plane in _by_face(mesh, np.arange(len(curved))):
         curved[at] = not plane
