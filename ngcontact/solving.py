@@ -15,12 +15,12 @@ from .adaptivity import (
     Plan,
     Refinement,
     RefinementTree,
+    Singularities,
     below_resolution,
     check_bool,
     continued,
     corners,
     next_plan,
-    unresolvable,
     warn_of_limit,
 )
 from .arrays import Array, joined, root_of_squares
@@ -415,7 +415,7 @@ def _first_plan(
 ) -> Plan:
     """The first level, of which nothing is forecast but by `start`."""
     tree, plane = RefinementTree(mesh, np.arange(mesh.ne)), problem.dim == 2
-    found = unresolvable([one.place for one in contradictory if plane])
+    found = Singularities.at([one.place for one in contradictory if plane], 0.0)
     if plane:
         found = joined([corners(problem, boundary_trace(mesh, 1)), found])
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)

@@ -12,10 +12,7 @@ from .refinement import Refining as Refining
 from .refinement import refined as refined
 from .singularities import END_POWER as END_POWER
 from .singularities import Singularities as Singularities
-from .singularities import at_ends as at_ends
-from .singularities import at_limit as at_limit
 from .singularities import below_resolution as below_resolution
 from .singularities import corners as corners
 from .singularities import ends_of_contact as ends_of_contact
-from .singularities import unresolvable as unresolvable
 from .singularities import warn_of_limit as warn_of_limit

@@ -143,11 +143,8 @@ def next_plan(
 
     error = root_of_squares(indicators) or 1.0
     most = refinement.growth if refinement.tolerance is None else refinement.growth**2
-    growth = (
-        max(last.growth / 2, 1.0)
-        if error > WRONG_FORECAST * last.error
-        else min(2 * last.growth, most)
-    )
+    wrong = error > WRONG_FORECAST * last.error
+    growth = max(last.growth / 2, 1.0) if wrong else min(2 * last.growth, most)
     now = unknowns(mesh, order, refinement.element)
     relative = min(solution.relative_error_estimate, 1.0)
     scale = relative ** (order / last.order - 1)  # errors of orders p on one mesh are c^p

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Array, Mask, joined
 from ..contact import ContactState, ending_segments
@@ -76,37 +77,32 @@ class Singularities:
     powers: Array  # (k,), of the area
     extents: Array  # (k,), lengths of the contact lines that end there, infinite elsewhere
 
+    @classmethod
+    def at(cls, places: ArrayLike, power: float, extent: float = np.inf) -> Singularities:
+        """Those at `places` (k, 2), all of one power; 0 where supports contradict each other."""
+        x = np.reshape(places, (-1, 2))
+        return cls(x, np.full(len(x), power), np.full(len(x), extent))
+
     @property
     def unresolvable(self) -> Array:
         """Places (j, 2) of infinite energy, lengths."""
         return self.places[self.powers == 0]
 
 
-def unresolvable(places: Sequence[Array]) -> Singularities:
-    """Singularities at `places` (k, 2) at which supports contradict each other."""
-    return _at(np.array(places).reshape(-1, 2), 0.0)
-
-
-def _at(places: Array, power: float, extents: Array | float = np.inf) -> Singularities:
-    """Singularities at `places` (k, 2), all of one power."""
-    count = len(places)
-    return Singularities(places, np.full(count, power), np.full(count, extents))
-
-
 def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
     """Singularities at transitions from binding to non-binding contact, on both bodies."""
-    found = [_at(np.empty((0, 2)), END_POWER)]
+    found = [Singularities.at([], END_POWER)]
     for pair in pairs:
         line, ends = pair.line, pair.transitions
         extent = float(np.linalg.norm(np.ptp(line.position, axis=0))) if line.node.size else 0.0
-        found.append(_at(ends.position, END_POWER, extent))
+        found.append(Singularities.at(ends.position, END_POWER, extent))
         if line.contact.primary is not None:
             inner, outer = line.position[ends.inner], line.position[ends.outer]
             apart = np.linalg.norm(outer - inner, axis=1)
             s = np.linalg.norm(ends.position - inner, axis=1) / np.where(apart > 0, apart, np.inf)
             gap = (1 - s) * line.gap[ends.inner] + s * line.gap[ends.outer]
             facing = ends.position + gap[:, None] * line.direction[ends.inner]
-            found.append(_at(facing, END_POWER, extent))
+            found.append(Singularities.at(facing, END_POWER, extent))
     return joined(found)
 
 
@@ -120,4 +116,5 @@ def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
     ends, changing = (np.diff(x[found.sides])[:, 0] != 0 for x in (trace.region, kind))
     inwards = ends & (found.angle > np.pi + BLUNT_ANGLE)  # where CAD edges end
     x = trace.arrays.vertices[found.vertex]
-    return joined([_at(x[changing & ~inwards], CHANGE_POWER), _at(x[inwards], CORNER_POWER)])
+    places = (x[changing & ~inwards], CHANGE_POWER), (x[inwards], CORNER_POWER)
+    return joined([Singularities.at(*each) for each in places])

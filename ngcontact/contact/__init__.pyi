@@ -1,6 +1,5 @@
 from .dual import contact_line as contact_line
 from .dual import for_partial_cover as for_partial_cover
-from .end_curves import SignedDistance as SignedDistance
 from .end_curves import area_in_contact as area_in_contact
 from .end_curves import curves_at_ends as curves_at_ends
 from .end_curves import signed_distance as signed_distance
@@ -27,8 +26,6 @@ from .nodal import jacobian as jacobian
 from .nodal import nodal_line as nodal_line
 from .nodal import prescribed_gap as prescribed_gap
 from .nodal import with_roles as with_roles
-from .projection import MATCHING_DISTANCE as MATCHING_DISTANCE
-from .search import FoundContact as FoundContact
 from .search import find_contacts as find_contacts
 from .state import ContactState as ContactState
 from .state import Transitions as Transitions

@@ -112,8 +112,8 @@ def _facing(
 ) -> dict[tuple[str, str], tuple[Index, float, Index]]:
     """The sample with the least gap, by the names of both sides, each as the first in turn.
 
-    Its segment (1,) and parameter, and the segments (q,) of the other body beside it. Of connected
-    bodies whose boxes are so near.
+    Its segment (1,) and parameter, and the segments (q,) of the other body. Of connected bodies
+    whose boxes are so near.
     """
     outer = np.flatnonzero(~trace.inner)
     names = np.array(trace.mesh.GetBoundaries())[trace.region]
@@ -137,10 +137,7 @@ def _facing(
             at = some[k]
             pair = str(names[segment[at]]), str(names[facing[k]])
             if pair not in found:
-                own, middle = segment[[at]], trace.curve[parts[b]].mean(axis=1)
-                size = np.abs(gap[k]) + trace.lengths(own) + trace.lengths(parts[b])
-                beside = np.linalg.norm(middle - points[at], axis=1) <= size
-                found[pair] = own, float(s[at]), parts[b][beside]
+                found[pair] = segment[[at]], float(s[at]), parts[b]
     return found
 
 

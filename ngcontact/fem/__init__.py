@@ -33,5 +33,4 @@ from .space import model_of as model_of
 from .space import normal_stress_of as normal_stress_of
 from .space import potential_energy as potential_energy
 from .space import stress_of as stress_of
-from .space import voigt_stress as voigt_stress
 from .space import von_mises as von_mises

@@ -5,7 +5,6 @@ from .checks import regions_of as regions_of
 from .contact import Contact as Contact
 from .contact import Gap as Gap
 from .material import ABOUT_AN_AXIS as ABOUT_AN_AXIS
-from .material import MODEL_NAMES as MODEL_NAMES
 from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies

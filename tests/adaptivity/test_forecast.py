@@ -14,10 +14,10 @@ from ngcontact.adaptivity import (
     Forecast,
     RefinementTree,
     Refining,
+    Singularities,
     corners,
     ends_of_contact,
     planned,
-    unresolvable,
 )
 from ngcontact.adaptivity.continuation import rebuilt, transferred
 from ngcontact.fem import boundary_trace, unknowns
@@ -25,7 +25,7 @@ from ngcontact.geometries import blocks, rings
 from ngcontact.mesh import first_mesh
 from ngcontact.problem import MeshArrays
 
-NONE = unresolvable([])
+NONE = Singularities.at([], 0.0)
 PROBLEM = Problem(geometry=blocks(), materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
 TRIANGLE = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]])
 QUARTERS = np.array([[0, 0, 0.5], [0.5, 0, 0.5], [0, 0.5, 0.5], [0.5, 0.5, -0.5]])
@@ -142,7 +142,7 @@ def divided(rounds, marked=None):
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 def test_what_is_forecast_of_parts_is_transferred_from_them(power, scale):
     """The two are inverse to each other, at a singular point (order 2: powers below 3) and away."""
-    singular = replace(unresolvable([np.zeros(2)]), powers=np.array([power]))
+    singular = Singularities.at(np.zeros(2), power)
     whole = Forecast(scale * TRIANGLE, np.array([0.7]), 2, singular)
     parts = whole.after(scale * PARTS, np.zeros(4, dtype=int))
     squares = transferred(parts, np.zeros(4, dtype=int), scale * TRIANGLE)
