@@ -207,7 +207,7 @@ def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
 
 def _extremes(extreme: np.ufunc, values: Array, window: int) -> Array:
     """Extremes (c, n - window + 1) of `values` (c, n) in all windows, of 2^k - 1 samples each."""
-    found, half = values, 1  # by those of half the size: SciPy's filters take six times as long
+    found, half = values, 1  # by those of half the size: few calls, of which SciPy's have many
     while half < window:
         sides = extreme(found[:, : -half - 1], found[:, half + 1 :])
         found, half = extreme(sides, values[:, half:-half]), 2 * half + 1
