@@ -48,10 +48,7 @@ def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -
 
 
 def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:
-    """Integrals (k, q) of the basis functions over each of the `segments` (k,).
-
-    At order 2 those of the vertices of facets are exactly 0.
-    """
+    """Integrals (k, q) of the basis functions over `segments` (k,), exactly 0 but for `weighs`."""
     s, w = trace.rule(trace.order + 2 * trace.geometry_order)
     every, places = trace.at_places(segments, s)
     scale = jacobian(trace, contact, every, places).reshape(-1, 1, len(w)) * w

@@ -310,7 +310,7 @@ def _squares(
     if force is not None:
         divergence += force  # (3.5)
     degree, correction = solution.projected.space.globalorder, None
-    names = nearly_incompressible(problem, mesh, corrected_from, solution.incompressibility)
+    names = nearly_incompressible(mesh, corrected_from, solution.incompressibility)
     if names:
         correction = PressureCorrection(solution, list(names), (divergence, jump), residuals)
         parts["incompressibility"] = correction.squares()

@@ -109,10 +109,7 @@ class Model:
         return (summing(3, (0,), (2,), (2,), (1,)) * voigt).Reshape((2, 2))
 
     def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
-        """Stress normal to the plane, a scalar, by the q Voigt components of the stress.
-
-        A general law does not say what it is in plane strain: 0 is taken there.
-        """
+        """Stress normal to the plane by `voigt`; 0 in plane strain of laws that do not tell."""
         nu = {body: law.nu for body, law in materials.items() if isinstance(law, Elastic)}
         normal = mesh.MaterialCF(nu, default=0) * (voigt[0] + voigt[1])
         held = {k: law.E * e[2] for k, (law, e) in strains.items() if isinstance(law, Elastic)}

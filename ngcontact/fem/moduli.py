@@ -133,11 +133,8 @@ def mandel(C: Array) -> Array:
     return C * scale * scale[:, None]
 
 
-def nearly_incompressible(
-    problem: Problem, mesh: ng.Mesh, limit: float, ratio: Array | None = None
-) -> dict[str, float]:
-    """Largest kappa / mu of each body where it exceeds `limit`; `ratio` (ne,) where it is known."""
-    ratio = moduli_of(problem, mesh).ratio if ratio is None else ratio
+def nearly_incompressible(mesh: ng.Mesh, limit: float, ratio: Array) -> dict[str, float]:
+    """Largest kappa / mu, `ratio` (ne,) in elements, of each body where it exceeds a limit."""
     if not (ratio > limit).any():
         return {}
     bodies = mesh.GetMaterials()

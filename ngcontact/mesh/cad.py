@@ -146,10 +146,7 @@ def drawn_sides(mesh: ng.Mesh, made: Callable[[OCCGeometry], list[Any]]) -> list
 
 
 def same_geometry(one: OCCGeometry | ng.Mesh, other: OCCGeometry | ng.Mesh) -> bool:
-    """Whether two geometries have the same bodies and edges, names included, up to round-off.
-
-    A mesh is the same as itself alone.
-    """
+    """Whether bodies, edges and their names are the same up to round-off; a mesh is only itself."""
     if one is other:
         return True
     if not (isinstance(one, OCCGeometry) and isinstance(other, OCCGeometry)):

@@ -121,7 +121,7 @@ def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     if order > 1 and (ratio > limit).any():
         where, beside = " beside curves", boundary_trace(mesh, 1).element[curved_facets(mesh)]
         ratio = np.where(np.isin(np.arange(mesh.ne), beside), ratio, 0.0)
-    for name, value in nearly_incompressible(problem, mesh, limit, ratio).items():
+    for name, value in nearly_incompressible(mesh, limit, ratio).items():
         warn(
             f'body "{name}" is nearly incompressible, lambda / mu = {value - 1:.3g}: elements of '
             f"order {order} lock{where}; use a higher order, or a smaller maxh"

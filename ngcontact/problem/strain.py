@@ -55,10 +55,7 @@ def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
 
 
 def strain_components(data: ng.CoefficientFunction) -> ng.CoefficientFunction:
-    """The components (6,) of what `strain_data` returned; about an axis rr, zz, the hoop's, rz.
-
-    By a product, so that functions of another mesh are looked for once at a point.
-    """
+    """Components (6,) of `strain_data`, by a product: functions are looked for once at a point."""
     size = data.dim
     parts = (float(k in places) for places in PLACES[size] for k in range(size))
     return ng.CF(tuple(parts), dims=(6, size)) * data.Reshape((size,))
