@@ -7,10 +7,12 @@ phi the dual basis: int psi_i phi_j = 0 for i other than j. The row of node j we
     d_j.(u_j - sum_k (int psi_j phi'_k / D_j) u'_k)  <=  int psi_j eps / D_j,
 
 with D_j the integral of phi_j over all facing parts, so that it has one unknown of the secondary as
-(2.10) has. Dual bases: Wohlmuth 2000, SIAM J. Numer. Anal. 38:989; of higher order Popp, Wohlmuth,
-Gee, Wall 2012, SIAM J. Sci. Comput. 34:B421. On Gauss-Lobatto nodes the psi of straight segments
-that face wholly contain the continuous functions of degree p - 1, since the quadrature of these
-nodes is exact to degree 2 p - 1; on others the constants.
+(2.10) has. Where normals turn the weights are changed a little, so that the force on the primary is
+in line with that on the node: moments balance, and no row resists the turn of a shaft in its hub.
+Dual bases: Wohlmuth 2000, SIAM J. Numer. Anal. 38:989; of higher order Popp, Wohlmuth, Gee, Wall
+2012, SIAM J. Sci. Comput. 34:B421. On Gauss-Lobatto nodes the psi of straight segments that face
+wholly contain the continuous functions of degree p - 1, since the quadrature of these nodes is
+exact to degree 2 p - 1; on others the constants.
 
 Where a segment faces in part, D_e need not be positive from order 2 on: hats of its ends replace
 phi, with more unknowns in a row, but the node's alone on curves: rotations along them close no gap.
@@ -203,6 +205,30 @@ def _passed_on(line: ContactLine, rows: Index, held: Mask) -> Index:
     return np.asarray(to[rows])
 
 
+def _in_line(place: Array, line: ContactLine, primary: Index, coupling: sp.csr_array) -> Array:
+    """Changes (e,) of the weights of a `coupling` (m, n) that bring reactions in line with forces.
+
+    Least weights of nodes of the `primary`, of their sizes, that leave the sum of a row as it is.
+    They take its mean of `place` (n, d) to the line along d_j through the node.
+    """
+    row, column = np.repeat(np.arange(len(line.node)), np.diff(coupling.indptr)), coupling.indices
+    d, own = line.direction, np.isin(column, primary)
+
+    def across(vectors: Array, row: Index) -> Array:
+        return np.asarray(vectors - d[row] * (vectors * d[row]).sum(axis=1)[:, None])
+
+    every, size = np.arange(len(d)), np.abs(coupling.data) * own
+    sizes = sp.csr_array((size, column, coupling.indptr), coupling.shape)
+    total = np.asarray(sizes.sum(axis=1))[:, None]
+    middle = np.divide(sizes @ place, total, out=np.zeros_like(d), where=total > 0)
+    arm = across(place[column] - middle[row], row)
+    moment = np.zeros((len(d), d.shape[1], d.shape[1]))
+    np.add.at(moment, row, size[:, None, None] * arm[:, :, None] * arm[:, None])
+    off = across(coupling @ place - place[line.node] * coupling.sum(axis=1)[:, None], every)
+    tilt = np.linalg.pinv(moment, rcond=SLIVER, hermitian=True) @ off[:, :, None]
+    return np.asarray(-size * (arm * tilt[row, :, 0]).sum(axis=1))
+
+
 def with_dual_rows(
     trace: BoundaryTrace, line: ContactLine, facing: Mask, held: Held | None = None
 ) -> tuple[ContactLine, Mask]:
@@ -271,10 +297,13 @@ def with_dual_rows(
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
     lowest[at_nodes] = -np.inf
     mean = from_triplets(across / weight[point], point, np.flatnonzero(here), shape)
-    position = line.position
+    position, coupling = line.position, mean @ coupling
+    place = np.zeros((coupling.shape[1], trace.model.dim))
+    for side in (line.segments, line.facing):
+        place[trace.nodes[side]] = trace.positions(side)
+    if contact.direction is None:
+        coupling.data += _in_line(place, line, trace.nodes[line.facing], coupling)
     if isinstance(trace, FacetTrace):  # where forces act, so that moments balance
-        place = np.zeros((coupling.shape[1], 3))
-        place[trace.nodes[segments]] = trace.positions(segments)
         position = np.where(trace.bernstein[line.node, None], place[line.node], position)
         if fixed.any():
             position = position - mean @ passed @ place
@@ -285,7 +314,7 @@ def with_dual_rows(
         # By matched segments, without one of which the ends alone face, over a slot at order 1.
         weight=np.where(at_nodes, np.where(nodal > 0, nodal, line.weight), nodal + dual),
         position=position,
-        coupling=(sp.diags_array(share) @ line.coupling + mean @ coupling).tocsr(),
+        coupling=(sp.diags_array(share) @ line.coupling + coupling).tocsr(),
         means=~at_nodes,
         faces=faces,
         covered=covered,

@@ -118,6 +118,38 @@ def test_sliding_on_a_cylinder():
     assert solution.reactions["pin_bottom"][2] == pytest.approx(area, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("order", "secondary"), [(1, "shaft"), (1, "hub"), (2, "shaft"), (2, "hub"), (3, "hub")]
+)
+def test_a_shaft_turns_in_its_hub(order, secondary):
+    """On one plane, warm, and with the clearance as a number."""
+    shaft, ring, hole = (
+        occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, r, h) for r, h in ((1, 0.6), (1.6, 0.5), (1.002, 1))
+    )
+    hub = ring - hole
+    for solid, name in ((shaft, "shaft"), (hub, "hub")):
+        solid.solids.name = name
+        solid.faces.name = name + "_rest"
+        solid.faces.Min(occ.Z).name = "foot"
+        for face in solid.faces:
+            low, high = face.bounding_box
+            if high.z - low.z > 0.4 and high.x < 1.3:
+                face.name = name + "_contact"
+    pair = Contact("shaft_contact", "hub_contact", gap=0.002)
+    problem = Problem(
+        geometry=occ.OCCGeometry(occ.Compound([shaft, hub])),
+        materials={"shaft": LAWS["inner"], "hub": LAWS["outer"]},
+        strain={"shaft": 0.01},
+        sliding="foot",
+        contact=[pair if secondary == "shaft" else pair.swapped()],
+    )
+    solution = solve(problem, maxh=0.6, order=order)
+    assert solution.force.sum() > 0
+    words = [str(motion) for motion in solution.free_motions]
+    assert len(words) == 4  # two translations of both along the plane, and two turns
+    assert sum("translation" in word for word in words) == 2
+
+
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_rigid_obstacle(bilateral):
     """A block on a rigid plane below it, by a gap; bilateral it is pulled as well."""
