@@ -16,6 +16,7 @@ from ngcontact.geometries import blocks, rounded_punch
 from ngcontact.geometries.region import body, compound, polygon
 from tests.estimator.bound.test_equilibrium import opening
 from tests.estimator.bound.test_exact import settled
+from tests.given_meshes import two_blocks
 from tests.scenes import unmatched_blocks
 
 ANISOTROPIC = Hooke([[100.0, 20.0, 5.0], [20.0, 10.0, 1.0], [5.0, 1.0, 3.0]])
@@ -222,6 +223,25 @@ def test_the_proved_bar_is_that_of_the_force_the_other_way(monkeypatch):
     monkeypatch.setattr("ngcontact.estimator.quantities.readings.force_bar", both)
     solve(cases.hertz_contact().problem, maxh=0.3, order=2).quantities()
     assert bars[1] == pytest.approx(bars[0], rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:contact 0")
+def test_penetration_that_no_point_sees_is_in_the_bound():
+    """Between points of a coarse mesh: u_h moves the upper block, and strains nothing."""
+    nodes = np.linspace(-1, 1, 5)  # of segments in whose middle the gap would be -0.02
+    problem = cases.touching_blocks(
+        {"top": (0, -0.02), "bottom": (0, 0)},
+        geometry=two_blocks(nodes, nodes),
+        contact=[replace(cases.TOUCHING, direction=(0, -1), gap=2 * (ng.x - 0.25) ** 2)],
+    )
+    solution = solve(problem, order=1)
+    assert not solution.active.any()
+    *_, fine = adapt(problem, order=3, max_dofs=3000)
+    assert solution.energy < 1e-20 * fine.energy
+    # |u| is the root of twice the energy of u, without loads. Measured: 2.66 times.
+    assert 1 <= solution.error_bound / (2 * fine.energy) ** 0.5 <= 4
+    low, high = solution.energy_bounds
+    assert low <= fine.energy <= high
 
 
 ROUGH = {  # largest effectivity; measured 1.11, 1.17, 1.05, 1.05, without vertices there 1.2 to 6
