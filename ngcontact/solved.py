@@ -15,9 +15,11 @@ from .contact import ContactState, by_line, curves_at_ends, signed_distance, sta
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .fem import (
     FacetTrace,
+    Moduli,
     contact_modulus,
     energy_norm,
     model_of,
+    moduli_of,
     normal_stress_of,
     potential_energy,
     stress_of,
@@ -74,6 +76,11 @@ class Solved:
         return normal
 
     @cached_property
+    def moduli(self) -> Moduli:
+        """Moduli of the elements, stresses."""
+        return moduli_of(self.problem, self.mesh)
+
+    @cached_property
     def pairs(self) -> list[ContactState]:
         """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
         program = self.discrete.program
@@ -81,6 +88,18 @@ class Solved:
         lines = self.discrete.lines
         parts = by_line(lines, gap), by_line(lines, self.force), by_line(lines, self.active)
         return [ContactState(*of_line) for of_line in zip(lines, *parts, strict=True)]
+
+    @cached_property
+    def expected(self) -> list[ContactState]:
+        """The pairs as a finer mesh should find them, see `ContactState.expected`."""
+        problem, trace, found = self.problem, self.discrete.space.trace, list[ContactState]()
+        if problem.dim == 3:
+            return self.pairs
+        for state in self.pairs:
+            sides = trace.element[state.line.segments], trace.element[state.line.facing]
+            modulus = contact_modulus(problem, self.moduli, *sides)
+            found.append(state.expected(modulus, trace.model))
+        return found
 
     @cached_property
     def points(self) -> Array:
@@ -240,18 +259,6 @@ def made_of(
         work=work | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
         **others,
     )
-
-
-def expected_pairs(solution: Solved) -> list[ContactState]:
-    """The pairs of a solution as a finer mesh should find them, see `ContactState.expected`."""
-    problem, trace, found = solution.problem, solution.discrete.space.trace, list[ContactState]()
-    if problem.dim == 3:
-        return solution.pairs
-    for state in solution.pairs:
-        sides = trace.element[state.line.segments], trace.element[state.line.facing]
-        modulus = contact_modulus(problem, solution.mesh, *sides)
-        found.append(state.expected(modulus, trace.model))
-    return found
 
 
 def full_stress(solution: Solved) -> ng.CoefficientFunction:

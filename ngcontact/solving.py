@@ -51,7 +51,7 @@ from .problem import Contact, MeshArrays, Problem
 from .quadrature import evaluations, sample_data, unresolved, warn_of_unresolved
 from .results import with_progress
 from .solution import Solution
-from .solved import expected_pairs, made_of
+from .solved import made_of
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 COARSE_RUN_FROM = 20_000
@@ -195,7 +195,7 @@ def solve_on(
         if start is None:
             active = first_active_set(discrete)
         else:
-            active = carried_active_set(discrete.lines, expected_pairs(start))
+            active = carried_active_set(discrete.lines, start.expected)
         minimiser = minimise_energy(discrete, active)
         tree = RefinementTree(mesh, np.arange(mesh.ne))
         solution = made_of(Solution, minimiser, tried, element, curved, tree=tree)

@@ -12,7 +12,6 @@ from ..estimator import Estimated
 from ..fem import unknowns
 from ..mesh import curve
 from ..problem import MeshArrays, Problem
-from ..solved import expected_pairs
 from .marking import doerfler
 from .planning import Aim, Forecast, Plan, Refinement, areas, depths, planned, touching
 from .refinement import RefinementTree, Refining
@@ -38,7 +37,7 @@ def continued(
         corners=MeshArrays(start.mesh).corners,
         squares=(rest / error) ** 2,
         order=order,
-        singular=joined([first.corners, ends_of_contact(expected_pairs(start))]),
+        singular=joined([first.corners, ends_of_contact(start.expected)]),
     )
     now = start.relative_error_estimate * error / root_of_squares(start.indicators)
     share = (goal or now) / now * FIRST_LEVEL_SHARE ** (-order / 2)  # unknowns ~ error^(-2/p)

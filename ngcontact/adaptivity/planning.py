@@ -13,7 +13,6 @@ from ..estimator import Estimated
 from ..fem import ORDERS, check_element, unknowns
 from ..mesh import copied, curve, unresolved
 from ..problem import MeshArrays, bisect
-from ..solved import expected_pairs
 from .marking import doerfler
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact
@@ -132,7 +131,7 @@ def next_plan(
     if not indicators.any():
         indicators = solution.indicators
     order = refinement.next_order(last.order, solution.relative_error_estimate)
-    size, pairs = refinement.ending * solution.relative_error_estimate, expected_pairs(solution)
+    size, pairs = refinement.ending * solution.relative_error_estimate, solution.expected
     limit, marked = at_limit(mesh, mesh.GetCurveOrder()), doerfler(indicators, theta)
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)

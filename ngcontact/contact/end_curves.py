@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, Index, Mask, paths
-from ..fem import FacetTrace, contact_modulus
+from ..fem import FacetTrace, contact_modulus, moduli_of
 from ..problem import Problem
 from ..reference import triangle
 from .state import ContactState
@@ -48,7 +48,7 @@ def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) ->
     opened = np.where(active, 0.0, np.maximum(state.gap, 0.0) ** (2 / 3))
     slope = _slope(trace, line.segments, name, at_nodes(opened), at_nodes(closed))
     sides = trace.element[line.segments], trace.element[line.facing]
-    K = 0.75 * contact_modulus(problem, trace.mesh, *sides) * slope**1.5
+    K = 0.75 * contact_modulus(problem, moduli_of(problem, trace.mesh), *sides) * slope**1.5
     if 0 < K**2 < np.inf:
         value = np.where(active, np.maximum(closed / K**2, INSIDE_DISTANCE), -opened / slope)
     else:  # nothing is open, or without a slope: ends lie midway between nodes

@@ -45,7 +45,6 @@ from ..arrays import Array, Index, Mask, power_of_two, root_of_squares
 from ..fem import (
     NEARLY_INCOMPRESSIBLE,
     law_measures,
-    moduli_of,
     nearly_incompressible,
     rough_moduli,
 )
@@ -79,7 +78,7 @@ def scaled(solved: Solved) -> ScaledSolution:
     """A solution in units of its own."""
     problem, stress, boundary = solved.problem, solved.stress, solved.discrete.space.trace
     mesh = boundary.mesh
-    stiffness = moduli_of(problem, mesh)
+    stiffness = solved.moduli
     modulus = power_of_two(stiffness.shear)
     # sigma_h as polynomials, to be differentiated: right for any modulus and curved elements; its
     # jumps cost a fifth of those of the stress.

@@ -45,7 +45,7 @@ SAMPLES = {
 
 @dataclass(frozen=True, eq=False)
 class Moduli:
-    """Moduli of the law in each element, stresses; 0 where they were not asked for."""
+    """Moduli of the law in each element, stresses."""
 
     # Half the smallest eigenvalue of C on strains, c_0 / 2 in HH81 (2.7), the least in the
     # element: mu of isotropic laws with nu >= 0, and kappa below.
@@ -60,8 +60,8 @@ class Moduli:
     ratio: Array  # (ne,), of the bulk modulus and half the smallest eigenvalue, in the middle
 
 
-def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
-    """Moduli of elements `asked` (ne,) for, of all when left out; others may have none."""
+def moduli_of(problem: Problem, mesh: ng.Mesh) -> Moduli:
+    """Moduli of all elements."""
     region, of_region = MeshArrays(mesh).bodies, np.zeros((4, len(mesh.GetMaterials())))
     varying = []
     for pattern, law in problem.materials.items():
@@ -72,13 +72,11 @@ def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Mod
             of_region[:, mask] = _constant(law, problem.model, mesh)
     result = of_region[:, region]
     for law, mask in varying:
-        at = mask[region] if asked is None else mask[region] & asked
-        if at.any():
-            rule = SAMPLES[mesh.dim]
-            points = mesh.MapToAllElements(rule, ng.VOL).reshape(-1, len(rule))[at]
-            law_there = law.voigt(problem.model)
-            C = np.asarray(law_there(points.ravel()))
-            result[:, at] = _moduli(C.reshape(-1, len(rule), *law_there.dims))
+        at, rule = mask[region], SAMPLES[mesh.dim]
+        points = mesh.MapToAllElements(rule, ng.VOL).reshape(-1, len(rule))[at]
+        law_there = law.voigt(problem.model)
+        C = np.asarray(law_there(points.ravel()))
+        result[:, at] = _moduli(C.reshape(-1, len(rule), *law_there.dims))
     return Moduli(*result)
 
 
@@ -95,15 +93,13 @@ def _moduli(C: Array) -> Array:
     return np.array([smallest.min(axis=1) / 2, kappa[:, 0], rigidity, ratio])
 
 
-def contact_modulus(problem: Problem, mesh: ng.Mesh, *sides: Index) -> float:
+def contact_modulus(problem: Problem, moduli: Moduli, *sides: Index) -> float:
     """E*, a stress: 1 / E* is the sum over sides of mean (1 - nu^2) / E, in plane stress 1 / E.
 
     The sides are elements (k,); one without any is rigid. Of laws that are not isotropic the
     modulus of shear and the bulk modulus of `Moduli` count.
     """
-    asked = np.zeros(mesh.ne, dtype=bool)
-    asked[np.concatenate(sides)] = True
-    moduli, compliance = moduli_of(problem, mesh, asked), 0.0
+    compliance = 0.0
     for side in sides:
         if len(side):
             mu, kappa = moduli.shear[side].mean(), moduli.bulk[side].mean()

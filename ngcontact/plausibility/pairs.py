@@ -16,7 +16,6 @@ where the hole is the secondary.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,8 +34,7 @@ from ..contact import (
     prescribed_gap,
     twins,
 )
-from ..fem import BoundaryTrace, FacetTrace, Moduli, moduli_of
-from ..problem import Problem
+from ..fem import BoundaryTrace, FacetTrace
 from ..reference import triangle
 from ..solved import Solved
 
@@ -103,7 +101,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> dict[tuple[str, int], str]
         messages = {}
         if force > noise:
             zones = zones_of(state)
-            messages["strain"] = _large_strains(problem, trace, state, zones)
+            messages["strain"] = _large_strains(solution, state, zones)
             if not messages["strain"]:  # else no other check means anything
                 messages["direction"] = _inclined(trace, state)
                 messages["gap"] = contradicted(trace, state)
@@ -208,12 +206,11 @@ def zones_of(state: ContactState) -> ContactZones:
     )
 
 
-def _large_strains(
-    problem: Problem, trace: BoundaryTrace, state: ContactState, zones: ContactZones
-) -> str:
+def _large_strains(solution: Solved, state: ContactState, zones: ContactZones) -> str:
     """Message where strains are not small; "" elsewhere."""
     pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
-    modulus = _softer(lambda law: law.bulk + law.shear, problem, trace, state)
+    moduli, trace = solution.moduli, solution.discrete.space.trace
+    modulus = _softer(moduli.bulk + moduli.shear, trace, state)
     if pressure <= LARGE_PRESSURE * modulus:
         return ""
     return (
@@ -223,15 +220,10 @@ def _large_strains(
     )
 
 
-def _softer(
-    modulus: Callable[[Moduli], Array], problem: Problem, trace: BoundaryTrace, state: ContactState
-) -> float:
-    """Mean of a `modulus` over the elements at each side; that of the softer side, a stress."""
+def _softer(modulus: Array, trace: BoundaryTrace, state: ContactState) -> float:
+    """Mean of a `modulus` (ne,) over the elements at each side; that of the softer, a stress."""
     sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
-    asked = np.zeros(trace.mesh.ne, dtype=bool)
-    asked[np.concatenate(sides)] = True
-    values = modulus(moduli_of(problem, trace.mesh, asked))
-    return float(min(values[side].mean() for side in sides if len(side)))
+    return float(min(modulus[side].mean() for side in sides if len(side)))
 
 
 def _small_zone(trace: BoundaryTrace, state: ContactState, zones: ContactZones) -> str:
@@ -366,7 +358,7 @@ def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
     if depth <= noise:
         return ""
     [length] = trace.lengths(seen.segment[[deepest]])
-    missing = _softer(lambda law: law.shear, solution.problem, trace, state) * depth / float(length)
+    missing = _softer(solution.moduli.shear, trace, state) * depth / float(length)
     if missing <= MISSING_PRESSURE * peak:
         return ""
     place = ", ".join(f"{value:.4g}" for value in seen.x[deepest])
