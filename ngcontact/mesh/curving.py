@@ -7,7 +7,7 @@ import numpy as np
 from netgen.meshing import IdentificationType
 
 from ..arrays import Array, Integers
-from ..problem import PIECES, MeshArrays
+from ..problem import KEPT, MeshArrays
 from .cad import CadEdge, cad_edges
 from .faces import curved_facets
 
@@ -41,8 +41,7 @@ def copied(mesh: ng.Mesh) -> ng.Mesh:
     for one, other, number in mesh.ngmesh.GetIdentifications():  # of solids; `Copy` drops them
         copy.ngmesh.AddPointIdentification(one, other, number, IdentificationType.PERIODIC)
     keep_parents(copy, vertex_parents(mesh))
-    if hasattr(mesh, PIECES):
-        setattr(copy, PIECES, getattr(mesh, PIECES))
+    setattr(copy, KEPT, dict(getattr(mesh, KEPT, {})))
     return copy
 
 

@@ -9,7 +9,7 @@ from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies
 from .mesh_arrays import AXIS_RADIUS as AXIS_RADIUS
-from .mesh_arrays import PIECES as PIECES
+from .mesh_arrays import KEPT as KEPT
 from .mesh_arrays import POSITION as POSITION
 from .mesh_arrays import MeshArrays as MeshArrays
 from .mesh_arrays import bisect as bisect

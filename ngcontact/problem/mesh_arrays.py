@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -22,7 +23,8 @@ PARAMETERS = 32  # bytes of Netgen's triangles before those of their corners' su
 
 AXIS_RADIUS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
 
-PIECES = "_ngcontact_pieces"  # attribute of a mesh: the hash of its elements, and their `pieces`
+# Attribute of a mesh: by name what was found of its elements and facets, and the hash of these.
+KEPT = "_ngcontact_kept"
 
 POSITION = ng.CF((ng.x, ng.y, ng.z))  # of a mesh point, lengths
 
@@ -131,18 +133,24 @@ class MeshArrays:
     @cached_property
     def pieces(self) -> Index:
         """Number (nv,) of the connected piece of the mesh that each vertex belongs to."""
-        key = hash(self.elements.tobytes())
-        known = self.mesh.__dict__.get(PIECES)
-        if known is not None and known[0] == key:
-            return np.asarray(known[1])
+        return np.asarray(self._kept("pieces", self._connected))
+
+    def _kept(self, name: str, find: Callable[[], Any]) -> Any:
+        """What `find` answers, once for the elements and facets of a mesh and of its copies."""
+        key = hash((self.elements.tobytes(), self.facets.tobytes()))
+        kept = self.mesh.__dict__.setdefault(KEPT, {})
+        if name not in kept or kept[name][0] != key:
+            kept[name] = key, find()
+        return kept[name][1]
+
+    def _connected(self) -> Index:
+        """The `pieces`."""
         nv, (ne, corners) = len(self.vertices), self.elements.shape
         # Vertices first, to be numbered first, then elements, each joined to its vertices.
         starts = np.concatenate([np.zeros(nv), corners * np.arange(ne + 1)]).astype(np.int32)
         joins = self.elements.ravel().astype(np.int32)
         graph = sp.csr_array((np.ones(joins.size), joins, starts), (nv + ne, nv + ne))
-        found = connected_components(graph, directed=False)[1][:nv].astype(np.intp)
-        self.mesh.__dict__[PIECES] = key, found
-        return found
+        return connected_components(graph, directed=False)[1][:nv].astype(np.intp)
 
     @property
     def facet_elements(self) -> Index:
@@ -185,6 +193,11 @@ class MeshArrays:
 
     @cached_property
     def _at_facets(self) -> tuple[Index, Index]:
+        one, other = self._kept("sides", self._sides_at_facets)
+        return one, other
+
+    def _sides_at_facets(self) -> tuple[Index, Index]:
+        """Both elements (k,) at each facet, one twice on the outer boundary."""
         marked = np.zeros(len(self.vertices), dtype=bool)
         marked[self.facets] = True
         sides = self.sides.reshape(-1, self.dim)
