@@ -95,12 +95,12 @@ def zeros(order: int, values: Array) -> tuple[Index, Array]:
 
     Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points.
     """
-    number, places = list[Index](), list[Array]()
+    number, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
     coefficients = values @ _coefficients(order).T
     size = np.abs(coefficients)
     large = size > COEFFICIENT_ROUND_OFF * size.max(axis=1, keepdims=True)
     degree = (large * np.arange(order + 1)).max(axis=1)
-    for n in range(1, order + 1):  # eigenvalues of companion matrices
+    for n in np.unique(degree[degree > 0]).tolist():  # eigenvalues of companion matrices
         some = np.flatnonzero(degree == n)
         companion = np.tile(legendre.legcompanion(np.eye(n + 1)[n]), (len(some), 1, 1))
         scale = np.sqrt((2 * n - 1) / (2 * np.arange(n) + 1)) * n / (2 * n - 1)

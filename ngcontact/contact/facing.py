@@ -203,7 +203,7 @@ def _passed(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Ind
     local, corners = local[:-1][one], np.stack([cut[:-1][one], cut[1:][one]], axis=1)
     segment, middle = segments[local], corners.sum(axis=1) / 2
     d = rays(trace, contact, segment, middle)
-    met = partners(trace, facing, segment, trace.point(segment, middle), d)
+    met = partners(trace, facing, segment, trace.point(segment, middle), d, nodes=False)
     on = (met.segment >= 0) & ((trace.normal(segment, middle) * d).sum(axis=1) > FACING_COSINE)
     share = corners[on, 1] - corners[on, 0]
     return FacingPieces(local[on], corners[on], met.segment[on], met.s[on], share)

@@ -190,18 +190,15 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
     degree = curve.shape[1] - 1
     velocity = np.einsum("ji,qid->qjd", lagrange_derivative(degree, gauss_lobatto(degree)), curve)
 
-    def ahead(point: Index, segment: Index, s: Array) -> Array:
-        return ((points[point] - at(curve, segment, s)) * at(velocity, segment, s)).sum(axis=1)
-
-    block = max(1, PAIRS_AT_ONCE // max(1, curve.size))  # each pair holds its curve
+    ends, slopes = curve[:, [0, -1]], velocity[:, [0, -1]]
+    block = max(1, PAIRS_AT_ONCE // max(1, ends.size))
     found = [np.zeros((2, 0), dtype=np.intp)]
     for first in range(0, len(points), block):
-        these = np.arange(first * len(curve), min(first + block, len(points)) * len(curve))
-        point, segment = np.divmod(these, len(curve))
-        starts, ends = np.zeros(len(these)), np.ones(len(these))
+        apart = points[first : first + block, None, None] - ends
+        ahead, behind = np.einsum("kqed,qed->ekq", apart, slopes)
         # The nearest point of the segment, not the farthest.
-        passed = (ahead(point, segment, starts) > 0) & (ahead(point, segment, ends) < 0)
-        found.append(np.stack([point[passed], segment[passed]]))
+        point, segment = ((ahead > 0) & (behind < 0)).nonzero()
+        found.append(np.stack([point + first, segment]))
     point, segment = np.concatenate(found, axis=1)
 
     def step(s: Array, number: Index) -> Array:
