@@ -206,22 +206,11 @@ def areas(corners: Array) -> Array:
     return np.asarray(np.abs((across(first) * second).sum(axis=1)) / 2)
 
 
-def depths(corners: Array, places: Array) -> Array:
-    """Least barycentric coordinate (n,) of `places` (n, 2) in triangles, negative outside.
-
-    Of triangles with `corners` (n, 3, 2), or (n, k) of `places` (k, 2) and (n, 1, 3, 2).
-    """
-    origin = corners[..., 0, :]
-    first, second, to = corners[..., 1, :] - origin, corners[..., 2, :] - origin, places - origin
-    whole = (across(first) * second).sum(axis=-1)
-    along = (across(to) * second).sum(axis=-1) / whole
-    beside = (across(first) * to).sum(axis=-1) / whole
-    return np.asarray(np.minimum(np.minimum(along, beside), 1 - along - beside))
-
-
 def touching(corners: Array, places: Array) -> Mask:
     """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
-    return depths(corners[:, None], places) >= -TOUCHING_COORDINATE
+    inwards = across(np.roll(corners, -1, axis=1) - corners)
+    height = inwards @ places.T - (inwards * corners).sum(axis=2)[..., None]
+    return np.asarray(height.min(axis=1) >= -2 * TOUCHING_COORDINATE * areas(corners)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
