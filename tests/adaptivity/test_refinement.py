@@ -4,8 +4,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from ngcontact.adaptivity import Refining, refined
-from ngcontact.adaptivity.planning import touching
+from ngcontact.adaptivity import refined
 from ngcontact.fem import boundary_trace
 from ngcontact.mesh import curve, first_mesh
 from ngcontact.problem import MeshArrays
@@ -14,7 +13,6 @@ from tests.pairs import ALL, BLOCKS, BOUNDED, ROUND_OFF, pressed, unmatched
 from tests.scenes import vertices
 
 LEVELS = 6
-SIDES = pytest.mark.parametrize("side", ["secondary", "primary"])
 
 
 def shapes(mesh):
@@ -49,7 +47,7 @@ def matched_points(pair, mesh):
     return [at[np.abs(at[:, 0]) < 0.9 * pair.part, 0] for at in points]
 
 
-@SIDES
+@pytest.mark.parametrize("side", ["secondary", "primary"])
 @pytest.mark.parametrize("name", [name for name in ALL if "punch" not in name])
 def test_six_levels_marked_on_one_side_only(name, side):
     """Lines stay matched, triangles positive and well shaped, the rest as it was."""
@@ -80,38 +78,6 @@ def test_six_levels_marked_on_one_side_only(name, side):
         for boundary, radius in (("hole", 0.5), ("inner_contact|outer_contact", 1.0), ("rim", 2)):
             distance = np.linalg.norm(vertices(mesh, boundary), axis=1)
             assert np.abs(distance - radius).max() < ROUND_OFF
-
-
-def test_an_unmarked_facing_segment_is_divided_once_and_no_further():
-    problem = BOUNDED["blocks"].problem()
-    mesh = first_mesh(problem, 0.25)
-    trace = boundary_trace(mesh, 1)
-    upper = trace.segments("upper_contact")
-    marked = np.zeros(mesh.ne, dtype=bool)
-    marked[trace.element[upper[len(upper) // 2]]] = True
-    result = refined(problem, mesh, marked)
-    for side in ("upper_contact", "lower_contact"):
-        assert len(vertices(result, side)) == len(vertices(mesh, side)) + 1
-
-
-@SIDES
-@pytest.mark.parametrize("name", ["bounded polygon", "bounded rings", "enlarging disc on block"])
-def test_several_bisections(name, side):
-    """Parts lie in their parents and fill them; when all are done lines are matched."""
-    pair = ALL[name]
-    refining = Refining(pair.problem(), first_mesh(pair.problem(), 0.4))
-    for level in range(3):
-        old, mesh = MeshArrays(refining.mesh).corners, refining.mesh
-        size = shapes(mesh)[0]
-        marked = near_tip(mesh, getattr(pair.contact, side), 0.5 / 2**level)
-        parent = refining.bisect(marked)
-        assert (parent[: len(old)] == np.arange(len(old))).all()
-        if "polygon" in name:  # new vertices leave the sides of curved elements
-            centres = MeshArrays(refining.mesh).corners.mean(axis=1)
-            assert all(touching(old[[i]], centres[[k]])[0, 0] for k, i in enumerate(parent))
-            assert np.bincount(parent, shapes(refining.mesh)[0]) == pytest.approx(size, rel=1e-12)
-        assert (np.bincount(parent)[marked] >= 2).all()
-    assert unmatched(*matched_points(pair, refining.finished())) < ROUND_OFF
 
 
 def test_a_mesh_without_cad_stays_matched():
