@@ -8,6 +8,5 @@ from .sparse import cholesky as cholesky
 from .sparse import cholesky_of_closed_rows as cholesky_of_closed_rows
 from .sparse import congruent as congruent
 from .sparse import handed_over as handed_over
-from .sparse import inverse_of as inverse_of
 from .sparse import lower_half as lower_half
 from .sparse import shared as shared

@@ -45,13 +45,15 @@ def reversed_order(matrix: ng.BaseMatrix) -> ng.BaseMatrix:
     return there
 
 
-def _from_entries(row: Index, column: Index, values: Array, shape: tuple[int, int]) -> Any:
-    """NGSolve's matrix (m, n), its `shape`, of `values` (k,) at `row` and `column` (k,), summed."""
+def _from_entries(
+    row: Sequence[Index], column: Sequence[Index], values: Sequence[Array], shape: tuple[int, int]
+) -> Any:
+    """NGSolve's matrix (m, n), its `shape`, the sum of parts `values` (k,) at `row`, `column`."""
     entries = []
     # NumPy arrays as arguments would be converted entry by entry, at ten times the price.
-    for kind, x in ((Array_I_S, row), (Array_I_S, column), (Array_D_S, values)):
-        entries.append(kind(len(x)))
-        entries[-1].NumPy()[:] = x
+    for kind, parts in ((Array_I_S, row), (Array_I_S, column), (Array_D_S, values)):
+        entries.append(kind(sum(map(len, parts))))
+        np.concatenate(parts, out=entries[-1].NumPy(), casting="same_kind")
     return ng.la.SparseMatrixd.CreateFromCOO(*entries, *shape)
 
 
@@ -62,14 +64,9 @@ def _rows(K: sp.csr_array) -> Index:
 
 def assembled(blocks: Sequence[tuple[Index, Array]], n: int) -> ng.BaseMatrix:
     """NGSolve's matrix (n, n), a sum: `blocks` (b, k) and (b, k, k) are unknowns and values."""
-    size, end = sum(values.size for _, values in blocks), 0
-    row, column, entries = Array_I_S(size), Array_I_S(size), Array_D_S(size)
-    for at, values in blocks:
-        start, end, k = end, end + values.size, at.shape[1]
-        row.NumPy()[start:end] = np.repeat(at, k)
-        column.NumPy()[start:end] = np.tile(at, k).ravel()
-        entries.NumPy()[start:end] = values.ravel()
-    return ng.la.SparseMatrixd.CreateFromCOO(row, column, entries, n, n)
+    row = [np.repeat(at, at.shape[1]) for at, _ in blocks]
+    column = [np.tile(at, at.shape[1]).ravel() for at, _ in blocks]
+    return _from_entries(row, column, [values.ravel() for _, values in blocks], (n, n))
 
 
 def handed_over(K: sp.sparray) -> ng.BaseMatrix:
@@ -80,14 +77,14 @@ def handed_over(K: sp.sparray) -> ng.BaseMatrix:
         memory = memory.base
     if isinstance(memory, _View) and (memory.owner.shape, memory.owner.nze) == (K.shape, K.nnz):
         return memory.owner
-    return _from_entries(_rows(K), K.indices, K.data, K.shape)
+    return _from_entries([_rows(K)], [K.indices], [K.data], K.shape)
 
 
 def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
     """Lower half of the symmetric `K` (n, n) for NGSolve: what its Cholesky factorisation reads."""
     row = _rows(K)
     lower = K.indices <= row
-    return _from_entries(row[lower], K.indices[lower], K.data[lower], K.shape)
+    return _from_entries([row[lower]], [K.indices[lower]], [K.data[lower]], K.shape)
 
 
 def congruent(matrix: ng.BaseMatrix, T: sp.csr_array) -> tuple[sp.csr_array, ng.BaseMatrix | None]:
@@ -112,37 +109,7 @@ def congruent(matrix: ng.BaseMatrix, T: sp.csr_array) -> tuple[sp.csr_array, ng.
 
 def _changed(matrix: ng.BaseMatrix, change: sp.csr_array) -> ng.BaseMatrix:
     """The sum of a matrix and a `change` (n, n), for NGSolve."""
-    if change.nnz == 0:
-        return matrix
-    A = shared(matrix)
-    places = _places(A, change)
-    if places is None:
-        return (matrix + handed_over(change)).CreateSparseMatrix()
-    total = matrix.CreateMatrix()
-    values = total.AsVector().FV().NumPy()
-    values[:] = A.data
-    values[places] += change.data
-    return total
-
-
-def _entries(K: sp.csr_array, rows: Index) -> tuple[Index, Index]:
-    """Numbers (k,) of the entries of `rows` of `K`, and their places, which rise, in any matrix."""
-    count = np.diff(K.indptr)[rows]
-    first = K.indptr[rows] - np.cumsum(count) + count
-    entries = np.arange(count.sum()) + np.repeat(first, count)
-    return entries, np.repeat(rows, count) * K.shape[1] + K.indices[entries]
-
-
-def _places(A: sp.csr_array, change: sp.csr_array) -> Index | None:
-    """Numbers (k,) of the entries of `A` at those of its `change`; None where `A` lacks one."""
-    rows = np.diff(change.indptr).nonzero()[0]
-    for some in (rows[:: len(rows) // 16 + 1], rows):  # some tell most often
-        entries, there = _entries(A, some)
-        _, wanted = _entries(change, some)
-        found = np.minimum(np.searchsorted(there, wanted), len(there) - 1)
-        if not np.array_equal(there[found], wanted):
-            return None
-    return entries[found]
+    return (matrix + handed_over(change)).CreateSparseMatrix() if change.nnz else matrix
 
 
 def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:

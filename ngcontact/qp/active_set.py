@@ -80,11 +80,6 @@ class ActiveSetIteration:
             return None
         return p.null_space.held_by(combinations)
 
-    def resisted(self) -> bool:
-        """Whether the active rows resist all motions they can."""
-        p = self.systems.program
-        return p.null_space.resisted(p.unknown[self.active])
-
     def rests(self, anchor: Anchor) -> bool:
         """Whether an anchor pulls at no pin."""
         p = self.systems.program
@@ -238,8 +233,9 @@ def minimise(systems: BorderedSystems, active: Mask | None = None) -> Iterate:
         moved = at - anchor.at
         force = anchor.stiffness * np.abs(moved)
         # A steady motion: go where it leads.
-        if force.max() > STEADY_RATIO * last and not current.resisted():
-            at = at + current.advance(moved) * moved
+        if force.max() > STEADY_RATIO * last:
+            if not p.null_space.resisted(p.unknown[current.active]):
+                at = at + current.advance(moved) * moved
         last = force.max()
         share = max(share / 10, MIN_PROXIMAL * PROXIMAL)
         anchor = Anchor(share * hardness, at)

@@ -35,19 +35,12 @@ def vanishing_combinations(resisted: Array, tolerance: float = NULL_SPACE_TOLERA
     if r == 0:
         return np.zeros((0, 0))
     _, singular, directions = np.linalg.svd(resisted, full_matrices=False)
-    return echelon(directions[singular <= tolerance * np.sqrt(len(resisted))].T)
-
-
-def echelon(vectors: Array) -> Array:
-    """Columns (n, l) of the same span as `vectors` (n, l), of which l rows form the identity."""
-    if vectors.shape[1] == 0:
-        return vectors
-    pivots = qr(vectors.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
-    pivots.sort()
-    result = vectors @ np.linalg.inv(vectors[pivots])
-    result[pivots] = np.eye(len(pivots))
-    result[np.abs(result) <= NULL_SPACE_TOLERANCE] = 0.0
-    return result
+    found = directions[singular <= tolerance * np.sqrt(len(resisted))].T
+    pivots = np.sort(separated(found, np.arange(r)))
+    found = found @ np.linalg.inv(found[pivots])
+    found[pivots] = np.eye(len(pivots))
+    found[np.abs(found) <= NULL_SPACE_TOLERANCE] = 0.0
+    return np.asarray(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,20 +130,11 @@ def _apart(columns: Columns) -> list[Columns]:
 
 
 def separated(vectors: Array, places: Index) -> Index:
-    """Places (q,) among `places` (k,) at which the `vectors` (n, q) are most independent.
-
-    One after the other where most is left beside those before, as in a pivoted QR factorisation.
-    """
-    some, found, q = vectors[places], [], vectors.shape[1]
-    left, rest = np.einsum("ki,ki->k", some, some), np.eye(q)  # squares, projection beside those
-    for _ in range(min(q, places.size)):
-        pivot = int(left.argmax())
-        found.append(places[pivot])
-        along = rest @ some[pivot]
-        along /= np.linalg.norm(along)
-        rest -= np.outer(along, along)
-        left -= (some @ along) ** 2
-    return np.array(found, dtype=np.intp)
+    """Places (q,) among `places` (k,) at which the `vectors` (n, q) are most independent."""
+    count = min(vectors.shape[1], places.size)
+    return (
+        places[qr(vectors[places].T, mode="r", pivoting=True)[1][:count]] if count else places[:0]
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import roots_jacobi
+from scipy.special import factorial, roots_jacobi
 
 from ..arrays import Array, Index
 from ..lagrange import gauss_lobatto
@@ -88,12 +88,9 @@ def bernstein(order: int) -> Array:
     They are nowhere negative, add up to 1, and are those of the edge on each edge.
     """
     L = nodes(order)
-    columns = [L[:, i] ** order for i in range(3)]
-    for i, j in EDGES if order > 1 else ():
-        a, b = L[:, i], L[:, j]
-        columns += [2 * a * b] if order == 2 else [3 * a**2 * b, 3 * a * b**2]
-    columns += [6 * L.prod(axis=1)] if order == 3 else []
-    return np.stack(columns, axis=1)
+    powers = np.rint(order * L)
+    ways = factorial(order) / factorial(powers).prod(axis=1)
+    return np.asarray(ways * (L[:, None] ** powers).prod(axis=2))
 
 
 @lru_cache
