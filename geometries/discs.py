@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from netgen.occ import OCCGeometry
 
 from ngcontact.geometries.check import flag, positive
@@ -181,19 +183,15 @@ def _half_disc(radius: float, above: bool, symmetric: bool, *, arc: str, flat: s
 
     The arc is split at the origin; `symmetric` keeps x >= 0.
     """
+    way = [LEFT, DOWN, RIGHT] if above else [RIGHT, UP, LEFT]
+    if symmetric:
+        way = [k for k in way if k != LEFT]
     y = radius if above else -radius
     centre: Point = (0.0, y)
-    right, origin, left = (radius, y), (0.0, 0.0), (-radius, y)
-    if above and symmetric:
-        straight = [(flat, segment(right, centre)), ("axis", segment(centre, origin))]
-        return [(arc, quarter_arc(centre, radius, DOWN, RIGHT)), *straight]
-    if above:
-        arcs = [(LEFT, DOWN), (DOWN, RIGHT)]
-        straight = [(flat, segment(right, left))]
-    elif symmetric:
-        arcs = [(RIGHT, UP)]
-        straight = [("axis", segment(origin, centre)), (flat, segment(centre, right))]
-    else:
-        arcs = [(RIGHT, UP), (UP, LEFT)]
-        straight = [(flat, segment(left, right))]
-    return [*((arc, quarter_arc(centre, radius, *ends)) for ends in arcs), *straight]
+    ends = {RIGHT: (radius, y), LEFT: (-radius, y)}  # others face contact, at the origin
+    first, last = (ends.get(k, (0.0, 0.0)) for k in (way[0], way[-1]))
+    arcs = [(arc, quarter_arc(centre, radius, *pair)) for pair in pairwise(way)]
+    if not symmetric:
+        return [*arcs, (flat, segment(last, first))]
+    names = ("axis", flat) if way[-1] == UP else (flat, "axis")
+    return [*arcs, (names[0], segment(last, centre)), (names[1], segment(centre, first))]
