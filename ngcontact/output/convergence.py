@@ -36,12 +36,6 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float) -> None:
         axes.annotate(text, place, xytext=offset, ha=ha, va=va, **beside)
 
 
-def errors_of(levels: Sequence[Guaranteed], name: str) -> tuple[Array, Array]:
-    """Unknowns (k,) of levels, and their errors (k,) of a `name`."""
-    unknowns = [float(level.displacement.space.ndof) for level in levels]
-    return np.array(unknowns), np.array([getattr(level, name) for level in levels])
-
-
 def plot_convergence(
     runs: Mapping[str, Run] | Sequence[Guaranteed],
     path: str | os.PathLike[str] | None = None,
@@ -81,19 +75,20 @@ def plot_convergence(
     figure = new_figure(target, figsize=(6.5, 5))
     axes = figure.subplots()
     for k, (label, run) in enumerate(named.items()):
-        levels = () if isinstance(run, tuple) else run
-        pair = run if isinstance(run, tuple) else errors_of(levels, "relative_error_estimate")
-        x, y = (np.asarray(values, dtype=float) for values in pair)
-        rate, name, (colour, mark) = (rates or {}).get(label), label, colour_and_mark(k)
+        name, rate, colour, mark = label, (rates or {}).get(label), *colour_and_mark(k)
         style: dict[str, Any] = {"color": colour, "marker": mark, "ms": 4}
-        if levels:
-            order = levels[-1].order
+        if isinstance(run, tuple):
+            x, y = (np.asarray(values, dtype=float) for values in run)
+        else:
+            order = run[-1].order
             name, rate = label or f"estimate, order {order}", order / 2 if rate is None else rate
+            sizes = [level.displacement.space.ndof for level in run]
+            levels = list(zip(sizes, run, strict=True))
+            x, y = np.transpose([(n, level.relative_error_estimate) for n, level in levels])
+            if bound := [(n, one.relative_error_bound) for n, one in levels if one.bounded]:
+                bound_name = f"{label}, bound".lstrip(", ")
+                axes.plot(*np.transpose(bound), ls="--", mfc="w", label=bound_name, **style)
         axes.plot(x, y, label=name, **style)
-        if known := [level for level in levels if level.bounded]:
-            bound = errors_of(known, "relative_error_bound")
-            name = f"{label}, bound".lstrip(", ")
-            axes.plot(*bound, ls="--", mfc="w", label=name, **style)
         if rate is not None:
             slope_triangle(axes, x, y, rate)
     axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="relative error, energy norm")

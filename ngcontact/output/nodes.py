@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import ngsolve as ng
 import numpy as np
@@ -13,6 +13,9 @@ from scipy.spatial import Delaunay
 
 from ..arrays import Array, Index
 from ..problem import MeshArrays
+
+if TYPE_CHECKING:
+    import pyvista
 
 # Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
 VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
@@ -24,6 +27,7 @@ COMPONENTS = (0, 0), (1, 1), (0, 1), (2, 2), (1, 2), (0, 2)
 class Nodes:
     """Lagrange nodes of a mesh, shared inside a body and never between bodies."""
 
+    order: int
     cells: Index  # (ne, n) in VTK's order, of triangles n = (order + 1) (order + 2) / 2
     body: Index  # (ne,), position of the element's region in `names`
     names: tuple[str, ...]  # the material regions
@@ -35,6 +39,19 @@ class Nodes:
         found = np.asarray(function(self.at), dtype=float).reshape(len(numbers), -1)
         count = np.bincount(numbers)
         return np.stack([np.bincount(numbers, column) / count for column in found.T], axis=1)
+
+    def grid(self, points: Array) -> pyvista.UnstructuredGrid:
+        """The elements with their nodes at `points` (n, d)."""
+        import pyvista
+
+        kind = VTK_CELLS[points.shape[1]][min(self.order, 3) - 1]
+        return pyvista.UnstructuredGrid({kind: self.cells}, in_space(points))
+
+    def divided(self) -> Nodes:
+        """The linear triangles, order^2 to each, into which the nodes divide curved ones."""
+        parts = subdivision(self.order)[0][:, ::-1]  # what VTK turns about z has positive volume
+        cells, body = self.cells[:, parts].reshape(-1, 3), np.repeat(self.body, len(parts))
+        return replace(self, order=1, cells=cells, body=body)
 
 
 def lattice(order: int, dim: int) -> Index:
@@ -65,6 +82,25 @@ def sized(cells: Index) -> Index:
     return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
+def in_space(vectors: Array) -> Array:
+    """The `vectors` (k, d) as (k, 3), with third components 0 in the plane."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
+def through(step: Any, data: Any) -> Any:
+    """What a filter of VTK makes of `data`."""
+    import pyvista
+
+    step.SetInputData(data)
+    step.Update()
+    return pyvista.wrap(step.GetOutput())
+
+
+def order_of(mesh: ng.Mesh, order: int) -> int:
+    """Degree of the geometry or of a displacement of `order`, whichever is higher."""
+    return max(int(mesh.GetCurveOrder()), order)
+
+
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     """Nodes of the Lagrange elements of a mesh of simplices; ``ValueError`` if it has others."""
     solid = mesh.dim == 3
@@ -86,7 +122,7 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
     key = np.sort(key.reshape(-1, mesh.dim + 1), axis=1)[:, ::-1]
     cells = np.unique(key, axis=0, return_inverse=True)[1]
-    return Nodes(cells.reshape(-1, len(weights)), body, names, at)
+    return Nodes(order, cells.reshape(-1, len(weights)), body, names, at)
 
 
 def stress_tensors(stress: Array) -> Array:

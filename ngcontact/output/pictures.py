@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index
 from ..solved import Solved
-from .files import check_path, replacing, several
-from .scene import Scene, Style, contact_lines, coordinates, picture, zones_of
+from .files import check_path, replacing
+from .scene import Scene, Style, coordinates, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from PIL.Image import Image
 
 # Colours of Okabe and Ito, distinct for any colour vision, and marks for those who print grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -41,19 +40,46 @@ LEAST_HALF_SIZES = 0.02, 0.002
 # `PEAK_RATIO` times the largest of the rest.
 PEAK_AREA, PEAK_RATIO = 0.005, 1.25
 
-# Margin beside a zone in a plot of the pressure: of the length of the zone, and of all lines shown.
-ZONE_MARGINS = 0.75, 0.002
+# Margin beside a zone in a plot of the pressure: of the length of the zone, and of all lines.
+ZONE_MARGINS = 0.75, 0.02
 # Zones have panels of their own if they fill less than this share, and are at most so many.
 PANEL_SHARE, MAX_PANELS = 0.4, 4
 # Pressures on this share of a zone are cut off if they exceed the rest by more than the factor.
 CUT_SHARE, CUT_RATIO = 0.1, 4.0
 
-MAX_INSIDE = 5  # lines of a legend in a panel, which would hide what more lines show
-
 FILM_DPI = 80
 FILM_HEADROOM = 1.05  # end of the scale of a film over its largest pressure
+FILM_LAST = 3  # times as long as others the last frame is seen
 
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What scenes, the frames of a film, have in common."""
+
+    corners: Window  # of all bodies
+    windows: list[Window]  # of close-ups
+    limits: tuple[float, float]  # ends of the colour scale
+    parts: list[Array]  # intervals (2,) of the contact lines, a panel for each
+    top: float | None  # end of the scale of pressures; None: what they need
+
+
+def view_of(scenes: Sequence[Scene]) -> View:
+    """The view that shows all scenes on the same scales."""
+    windows = close_ups(scenes)
+    low, high = np.transpose(
+        [colour_limits(scene.values, scene.triangles, scene.moved, windows) for scene in scenes]
+    )
+    limits = float(high.max() * np.sign(low.min())), float(high.max())
+    cuts = [cut_pressure(scene) for scene in scenes]
+    peaks = [float(scene.solution.pressure.max(initial=0.0)) for scene in scenes]
+    if len(scenes) > 1:
+        cuts = [cut or FILM_HEADROOM * peak for cut, peak in zip(cuts, peaks, strict=True)]
+    top = max((cut for cut in cuts if cut), default=None)
+    return View(
+        corners(scenes), windows, scenes[0].style.limits or limits, shown_parts(scenes), top
+    )
 
 
 def plot_solution(
@@ -67,11 +93,10 @@ def plot_solution(
     target = None if path is None else check_path(path, ".png")
     scene = picture(solution, style)
     figure = new_figure(target)
-    windows = close_ups([scene])
-    draw_scene(figure, scene, windows, style.limits or colour_range(scene, windows))
+    draw_scene(figure, scene, view_of([scene]))
     for _ in range(2):  # labels move with the ticks that a first layout leaves
         figure.draw_without_rendering()
-    show(figure, target, bbox_inches="tight", pad_inches=0.05)
+    show(figure, target)
     return figure
 
 
@@ -86,7 +111,7 @@ def new_figure(target: Path | None, **options: Any) -> Figure:
     return Figure(layout="constrained", **options)
 
 
-def show(figure: Figure, target: Path | None, **options: Any) -> None:
+def show(figure: Figure, target: Path | None) -> None:
     """Write a figure to its file, or show it on the screen."""
     if target is None:
         from matplotlib import pyplot
@@ -94,7 +119,7 @@ def show(figure: Figure, target: Path | None, **options: Any) -> None:
         pyplot.show()
         return
     with replacing(target) as (draft,):
-        figure.savefig(draft, format="png", dpi=150, **options)
+        figure.savefig(draft, format="png", dpi=150, bbox_inches="tight", pad_inches=0.05)
 
 
 def write_film(
@@ -133,7 +158,9 @@ def write_film(
         No solutions, titles of another number, an option that is none, a path that cannot be
         written: before any work.
     """
-    frames, style = list(several(solutions)), Style(**options)
+    from matplotlib.animation import PillowWriter
+
+    frames, style = list(solutions), Style(**options)
     if not frames:
         raise ValueError("solutions: give one at least")
     if titles is not None and len(titles) != len(frames):
@@ -143,64 +170,27 @@ def write_film(
     if any(solution.mesh.dim == 3 for solution in frames):
         raise ValueError("a film shows plane bodies: write pictures of solids by plot()")
     target = check_path(path, ".gif")
-    scenes = [picture(solution, style) for solution in frames]
-    scale = min(scene.scale for scene in scenes)
-    for k, scene in enumerate(scenes):
-        if scene.scale != scale:
-            scenes[k] = picture(frames[k], replace(style, scale=scale))
+    scale = min(picture(solution, style).scale for solution in frames)
+    scenes = [picture(solution, replace(style, scale=scale)) for solution in frames]
+    view, figure = view_of(scenes), new_figure(target)
     titles = titles or [
         f"{k + 1} of {len(frames)}: {s.displacement.space.ndof} unknowns"
         for k, s in enumerate(frames)
     ]
-    images = _images(scenes, titles)
-    times = [round(1000 * seconds)] * (len(images) - 1) + [round(3000 * seconds)]
-    options = {"save_all": True, "append_images": images[1:], "duration": times, "loop": 0}
-    with replacing(target) as (draft,):
-        images[0].save(draft, format="GIF", **options)
+    frames_per_second: Any = 1 / seconds
+    film = PillowWriter(frames_per_second)
+    with replacing(target) as (draft,), film.saving(figure, draft, FILM_DPI):
+        for scene, title in zip(scenes, titles, strict=True):
+            figure.clear()
+            draw_scene(figure, scene, view)
+            figure.suptitle(title)
+            film.grab_frame()
+        for _ in range(FILM_LAST - 1):
+            film.grab_frame()
     return target
 
 
-def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
-    """The frames, drawn with common scales."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from PIL import Image
-
-    style, frames, windows = scenes[0].style, [s.solution for s in scenes], close_ups(scenes)
-    ranges = [style.limits or colour_range(scene, windows) for scene in scenes]
-    limits = min(low for low, _ in ranges), max(high for _, high in ranges)
-    if style.limits is None and limits[0] < 0:
-        limits = -max(-limits[0], limits[1]), max(-limits[0], limits[1])
-    tops = [cut_pressure(s) or FILM_HEADROOM * float(s.pressure.max(initial=0.0)) for s in frames]
-    top = max(tops) / style.unit("stress")[1]
-    low, high = (corner / style.unit("length")[1] for corner in _corners(scenes))
-    margin = 0.03 * (high - low).max()
-    ends = [part for part in map(shown_part, frames) if part is not None] or [np.zeros(2)]
-    along = [np.array([np.min(ends), np.max(ends)])]
-    images: list[Any] = []
-    for scene, title in zip(scenes, titles, strict=True):
-        figure = Figure(layout="constrained", dpi=FILM_DPI)
-        profiles = draw_scene(figure, scene, windows, limits, along)
-        xlim, ylim = np.transpose([low - margin, high + margin]).tolist()
-        figure.axes[0].set(xlim=xlim, ylim=ylim)
-        for profile in profiles if top > 0 else ():
-            profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), top)
-        figure.suptitle(title)
-        if images:
-            figure.set_size_inches(*(size / FILM_DPI for size in images[0].shape[1::-1]))
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        images.append(np.asarray(canvas.buffer_rgba())[..., :3])
-    # A common palette: one stress has one colour in all frames.
-    common = Image.fromarray(np.vstack(images)).quantize(256)
-    colours = np.reshape(common.getpalette() or [255] * 3, (-1, 3))
-    colours[(colours >= 240).all(axis=1)] = 255  # Pillow rounds white to a neighbour
-    common.putpalette(colours.ravel().tolist())
-    plain = Image.Dither.NONE
-    return [Image.fromarray(image).quantize(palette=common, dither=plain) for image in images]
-
-
-def _corners(scenes: Sequence[Scene]) -> Window:
+def corners(scenes: Sequence[Scene]) -> Window:
     """Lower left and upper right corner of all scenes."""
     low = np.min([scene.moved.min(axis=0) for scene in scenes], axis=0)
     return low, np.max([scene.moved.max(axis=0) for scene in scenes], axis=0)
@@ -221,7 +211,7 @@ def _window(zone: Array, low: Array, high: Array) -> Window:
 
 def close_ups(scenes: Sequence[Scene]) -> list[Window]:
     """Windows on the small contact zones of scenes, one where they overlap, large forces first."""
-    low, high = _corners(scenes)
+    low, high = corners(scenes)
     groups: list[Array] = []
 
     def overlap(zone: Array, other: Array) -> bool:
@@ -250,74 +240,59 @@ def _quantile(share: float, values: Array, weights: Array) -> float:
     return float(values[order][min(last, len(order) - 1)])
 
 
-def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]:
-    """Ends of the colour scale: of the bodies and of each window, without peaks.
-
-    Peaks fill less than `PEAK_AREA` and exceed the rest by more than `PEAK_RATIO`: stresses at
-    corners and at ends of supports, which grow with refinement. Where both signs occur colours are
-    symmetric about 0.
-    """
-    middle = scene.moved[scene.triangles].mean(axis=1)
-    parts = [np.all((middle >= low) & (middle <= high), axis=1) for low, high in windows]
-    return colour_limits(scene.values, scene.triangles, scene.areas(), parts)
-
-
 def colour_limits(
-    values: Array, triangles: Index, areas: Array, parts: Sequence[Mask]
+    values: Array, triangles: Index, seen: Array, windows: Sequence[Window]
 ) -> tuple[float, float]:
-    """Ends of the scale of `values` (k,) at nodes of `triangles` (t, 3), see `colour_range`.
+    """Ends of the scale of `values` (k,) at nodes of `triangles` (t, 3), without peaks.
 
-    Windows are `parts` (t,) of the triangles, `areas` (t,) the areas of these.
+    Of the bodies and of each window: nodes are at `seen` (k, 2) in the picture. Peaks fill less
+    than `PEAK_AREA` and exceed the rest by more than `PEAK_RATIO`: stresses at corners and at ends
+    of supports, which grow with refinement. Where both signs occur colours are symmetric about 0.
     """
-    mean = np.abs(values)[triangles].mean(axis=1)
-    seen = [np.ones(len(areas), dtype=bool), *(part for part in parts if part.any())]
-    top = max(_quantile(PEAK_AREA, mean[part], areas[part]) for part in seen)
+    corners = seen[triangles]
+    areas = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    middle, mean = corners.mean(axis=1), np.abs(values)[triangles].mean(axis=1)
+    parts = [np.ones(len(areas), dtype=bool)]
+    parts += [np.all((middle >= low) & (middle <= high), axis=1) for low, high in windows]
+    top = max(_quantile(PEAK_AREA, mean[part], areas[part]) for part in parts if part.any())
     largest = float(np.abs(values).max(initial=0.0))
     top = largest if largest <= PEAK_RATIO * top else top
     top = top or 1.0
     return (-top, top) if values.min(initial=0.0) < 0 else (0.0, top)
 
 
-def draw_scene(
-    figure: Figure,
-    scene: Scene,
-    windows: Sequence[Window],
-    limits: tuple[float, float],
-    parts: Sequence[Array] | None = None,
-) -> list[Axes]:
-    """Draw a scene with close-ups, colour scale and pressure; returns the axes of the pressure.
+def draw_scene(figure: Figure, scene: Scene, view: View) -> None:
+    """Draw a scene with close-ups, colour scale and pressure.
 
     Bodies are on the left, close-ups in the middle, two in a column, and pressures on the right, a
-    panel for each of the intervals `parts` (2,) of the contact lines, chosen when left out; none
-    without contact points.
+    panel for each part of the contact lines; none without contact points.
     """
-    parts, style = parts or _shown_parts(scene.solution), scene.style
-    parts = parts if len(scene.solution.points) else []
-    width, height = np.ptp(scene.moved, axis=0)
+    style, windows = scene.style, view.windows
+    parts = view.parts if len(scene.solution.points) else []
+    (width, height), length = view.corners[1] - view.corners[0], style.unit("length")[1]
     tall = 1 if len(windows) < 2 else 2
     columns = -(-len(windows) // tall)
     ratios = [float(np.clip(width / height, 0.6, 2)), *[1.0 / tall] * columns]
-    ratios += [1.2 if len(parts) == 1 else 0.8 * len(parts)] * bool(parts)
+    ratios += [0.5 + 0.9 * len(parts)] * bool(parts)
     figure.set_size_inches(2 + HEIGHT * 0.9 * sum(ratios), HEIGHT)
     figure.set_layout_engine("constrained", w_pad=PANEL_PAD)
     grid = figure.add_gridspec(tall, len(ratios), width_ratios=ratios)
     bodies = figure.add_subplot(grid[:, 0])
     close = [figure.add_subplot(grid[k % tall, 1 + k // tall]) for k in range(len(windows))]
-    pressures: list[Axes] = []
     if parts:
         beside = grid[:, -1].subgridspec(1, len(parts), wspace=0.05)
-        pressures = list(beside.subplots(sharey=True, squeeze=False)[0])
-    shading, *_ = [_draw_bodies(axes, scene, limits) for axes in (bodies, *close)]
+        _draw_pressures(beside.subplots(sharey=True, squeeze=False)[0], scene, view)
+    shading, *_ = [_draw_bodies(axes, scene, view.limits) for axes in (bodies, *close)]
     space = " " if width / height > 0.9 else "\n"
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
-    _draw_windows(bodies, close, windows, style.unit("length")[1])
+    margin = np.array([-0.03, 0.03]) * max(width, height)
+    xlim, ylim = (np.transpose(view.corners) + margin) / length
+    bodies.set(xlim=xlim, ylim=ylim)
+    _draw_windows(bodies, close, windows, length)
     label, kind = scene.shown.label, scene.shown.kind
     label, (_, unit) = style.title(label, kind), style.unit(kind)
     extremes = float(scene.values.min()) / unit, float(scene.values.max()) / unit
     colour_bar(figure, shading, [bodies, *close], label, extremes)
-    if parts:
-        _draw_pressures(pressures, scene.solution, style, parts)
-    return pressures
 
 
 def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
@@ -351,13 +326,10 @@ def _draw_windows(
     bodies: Axes, close: Sequence[Axes], windows: Sequence[Window], unit: float
 ) -> None:
     """Frames of the windows around zones in the whole picture; axes of the close-ups."""
-    from matplotlib.patches import Rectangle
-
     several = len(windows) > 1
     for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
         (x, y), (right, top) = (corner / unit for corner in window)
-        frame = Rectangle((x, y), right - x, top - y, fill=False, color="crimson", lw=1.2)
-        bodies.add_patch(frame)
+        bodies.indicate_inset((x, y, right - x, top - y), edgecolor="crimson", alpha=1, lw=1.2)
         name = f"zone {k + 1}" if several else "zone in contact"
         axes.set(xlim=(x, right), ylim=(y, top), title=name)
         axes.locator_params(nbins=3 if several else 5)
@@ -370,104 +342,77 @@ def _draw_windows(
 def colour_bar(
     figure: Figure, shading: Any, axes: list[Axes], label: str, extremes: tuple[float, float]
 ) -> None:
-    """Colour bar; arrows and numbers show the `extremes`, least and largest, beyond its ends."""
+    """Colour bar; arrows and numbers tell the `extremes`, least and largest, beyond its ends."""
     (least, most), (low, high) = extremes, shading.get_clim()
     below, above = least < low, most > high
     extend = ("neither", "min", "max", "both")[below + 2 * above]
+    label += f", least {least:.3g}" * below + f", largest {most:.3g}" * above
     bar = figure.colorbar(shading, ax=axes, label=label, extend=extend)
     bar.ax.ticklabel_format(axis="y", **POWERS)
-    bar.formatter.set_locs(bar.get_ticks().tolist())
-    power = 16 if bar.formatter.get_offset() else 0  # which stands above the bar
-    for beyond, text, y, offset, va in (
-        (above, f"largest {most:.3g}", 1.0, 14 + power, "bottom"),
-        (below, f"least {least:.3g}", 0.0, -14, "top"),
-    ):
-        if beyond:
-            at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
-            font: dict[str, Any] = {"ha": "center", "va": va, "fontsize": 8}
-            bar.ax.annotate(text, (0.5, y), xytext=(0, offset), **at, **font)
 
 
-def shown_part(solution: Solved) -> Array | None:
-    """Ends (2,) of the interval of the coordinate that holds all zones, with margins."""
-    if not solution.active.any() or len(solution.points) < 2:
-        return None
-    lines = contact_lines(solution)
-    places = np.concatenate([s[solution.active[rows]] for _, rows, s in lines])
-    every = np.concatenate([s for *_, s in lines])
-    low, high = places.min(), places.max()
-    margin = max(0.75 * (high - low), 0.02 * np.ptp(every))
-    low, high = max(low - margin, every.min()), min(high + margin, every.max())
-    return np.array([low - 0.03 * margin, high + 0.03 * margin])
-
-
-def _shown_parts(solution: Solved) -> list[Array]:
+def shown_parts(scenes: Sequence[Scene]) -> list[Array]:
     """Intervals (2,) of the coordinate to show: one for each small zone if these are far apart."""
-    lines, whole = contact_lines(solution), shown_part(solution)
-    if whole is None:
-        every = np.concatenate([s for *_, s in lines] or [np.zeros(1)])
-        return [np.array([every.min(), every.max()])]
+    every = np.concatenate([np.zeros(0), *(s for scene in scenes for *_, s in scene.lines)])
+    first, last = (every.min(), every.max()) if every.size else (0.0, 0.0)
     parts: list[Array] = []
-    for zone in sorted(zones_of(solution, lines), key=lambda zone: float(zone.s.min())):
-        low, high = zone.s.min(), zone.s.max()
-        margin = max(ZONE_MARGINS[0] * (high - low), ZONE_MARGINS[1] * np.ptp(whole))
-        part = np.array([low - margin, high + margin])
+    zones = [zone.s for scene in scenes for zone in scene.paths]
+    for s in sorted(zones, key=lambda s: float(s.min())):
+        margin = max(ZONE_MARGINS[0] * np.ptp(s), ZONE_MARGINS[1] * (last - first))
+        part = np.array([s.min() - margin, s.max() + margin])
         if parts and part[0] <= parts[-1][1]:
             parts[-1][1] = max(parts[-1][1], part[1])
         else:
             parts.append(part)
+    whole = np.clip([parts[0][0], parts[-1][1]] if parts else [first, last], first, last)
     far = 1 < len(parts) <= MAX_PANELS and sum(map(np.ptp, parts)) < PANEL_SHARE * np.ptp(whole)
-    return parts if far else [whole]
+    return parts if far else [whole + 0.03 * np.ptp(whole) * np.array([-1, 1])]
 
 
-def cut_pressure(solution: Solved) -> float | None:
+def cut_pressure(scene: Scene) -> float | None:
     """End of the scale of pressures where peaks, as at corners, are cut off; None elsewhere."""
-    typical = 0.0
-    for _, rows, s in zones_of(solution, contact_lines(solution)):
+    pressure, typical = scene.solution.pressure, 0.0
+    for _, rows, s in scene.paths:
         lengths = np.gradient(s) if len(s) > 1 else np.ones(1)
-        typical = max(typical, _quantile(CUT_SHARE, solution.pressure[rows], lengths))
-    largest = float(solution.pressure.max(initial=0.0))
+        typical = max(typical, _quantile(CUT_SHARE, pressure[rows], lengths))
+    largest = float(pressure.max(initial=0.0))
     return CUT_RATIO / 2 * typical if largest > CUT_RATIO * typical > 0 else None
 
 
-def _draw_pressures(
-    several: Sequence[Axes], solution: Solved, style: Style, parts: Sequence[Array]
-) -> None:
-    """Pressure along the contact lines, a panel for each of the intervals `parts` (2,)."""
-    (_, stress), top = style.unit("stress"), cut_pressure(solution)
-    for axes, part in zip(several, parts, strict=True):
-        _draw_pressure(axes, solution, style, part)
+def _draw_pressures(several: Sequence[Axes], scene: Scene, view: View) -> None:
+    """Pressure along the contact lines, a panel for each part of them."""
+    stress, largest = scene.style.unit("stress")[1], scene.solution.pressure.max()
+    for axes, part in zip(several, view.parts, strict=True):
+        _draw_pressure(axes, scene, part)
     first, last = several[0], several[-1]
-    if top is not None:
-        first.set_ylim(-0.03 * top / stress, top / stress)
-        largest = f"{first.get_ylabel()}, largest {solution.pressure.max() / stress:.3g}"
-        first.set_ylabel(largest)
+    if view.top is not None:
+        first.set_ylim(-0.03 * view.top / stress, view.top / stress)
+        if largest > view.top:
+            first.set_ylabel(f"{first.get_ylabel()}, largest {largest / stress:.3g}")
     for axes in several[1:]:
         axes.set(ylabel="", title="")
-    if len(solution.problem.contact) > 1 or style.profile or not solution.active.all():
-        # Above the last of several panels, where it covers no points.
-        above = {"loc": "lower right", "borderaxespad": 0.3, "fontsize": "small", "ncols": 2}
-        beside = {"loc": "upper left", "fontsize": "small"}
-        outside = beside if len(last.get_legend_handles_labels()[0]) > MAX_INSIDE else above
-        covers = outside is above and last is first
-        last.legend(**({} if covers else outside | {"bbox_to_anchor": (1, 1)}))
+    handles, labels = last.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    if len(named) > 1:
+        last.legend(named.values(), named, loc="upper left", bbox_to_anchor=(1, 1))
 
 
-def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> None:
+def _draw_pressure(axes: Axes, scene: Scene, part: Array) -> None:
     """Pressure on an interval `part` (2,): points in contact are filled, open ones hollow."""
+    solution, style = scene.solution, scene.style
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
-    lines, contact = contact_lines(solution), solution.problem.contact
+    contact = solution.problem.contact
     several = len(contact) > 1
-    for k, (pair, rows, s) in enumerate(lines):
+    for pair, rows, s in scene.lines:
         colour, mark = colour_and_mark(pair)
         active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
-        new = several and pair not in [other for other, *_ in lines[:k]]
-        title = f"pair {pair}: {contact[pair].secondary}" if new else None
+        title = f"pair {pair}: {contact[pair].secondary}" if several else None
         size = 4 + 2 * min(len(contact) - 1 - pair, 2)  # visible behind later pairs
         axes.plot(at, p, color=colour, lw=1, marker=mark, ms=4, markevery=[], label=title)
         for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
-            label = name if state.any() and not several and k == 0 else None
-            axes.plot(at[state], p[state], mark, ms=size, mec=colour, mfc=fill, label=label)
+            if state.any():
+                label = None if several else name
+                axes.plot(at[state], p[state], mark, ms=size, mec=colour, mfc=fill, label=label)
     states = (solution.active, "0.4", "in contact"), (~solution.active, "w", "open")
     for state, fill, name in states if several else ():
         if state.any():

@@ -14,9 +14,9 @@ from scipy.spatial import KDTree
 from ..arrays import Array, Index, Mask, across, distances_along, paths
 from ..contact import neighbours
 from ..fem import von_mises
-from ..problem import ABOUT_AN_AXIS, MeshArrays
+from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
-from .nodes import Nodes, nodes_of, principal_stresses, subdivision
+from .nodes import Nodes, nodes_of, order_of, principal_stresses, subdivision
 
 MAX_TRIANGLES = 200_000  # of a picture: more cannot be seen
 # Of a zone's size: distance to a line of symmetry up to which both halves are one zone.
@@ -53,10 +53,12 @@ class Style:
             len(self.limits) == 2 and -np.inf < self.limits[0] < self.limits[1] < np.inf
         ):
             raise ValueError(f"limits = {self.limits}: give two finite numbers, the smaller first")
-        if not isinstance(self.units, Mapping):
-            raise TypeError(
-                f'units = {self.units!r}: give a mapping, as {{"length": "mm", "stress": "MPa"}}'
-            )
+        for name, given, example in (
+            ("units", self.units, '{"length": "mm", "stress": "MPa"}'),
+            ("profile", self.profile, '{"Hertz": a function of s}'),
+        ):
+            if not isinstance(given, Mapping):
+                raise TypeError(f"{name} = {given!r}: give a mapping, as {example}")
         for kind in self.units:
             if kind not in UNITS:
                 raise ValueError(f'units: "{kind}" is none of {", ".join(UNITS)}')
@@ -66,16 +68,9 @@ class Style:
                     f'units["{kind}"] = {self.units[kind]}: give a name, or a name and its size in '
                     'the unit of the data, as ("MPa", 1e6)'
                 )
-        if not isinstance(self.profile, Mapping):
-            raise TypeError(
-                f'profile = {self.profile!r}: give a mapping, as {{"Hertz": a function of s}}'
-            )
         for label, profile in self.profile.items():
-            if callable(profile):
-                continue
             try:
-                one, other = (np.asarray(values, dtype=float) for values in profile)
-                fits = one.ndim == 1 and one.shape == other.shape
+                fits = callable(profile) or np.array(profile, dtype=float).shape[:-1] == (2,)
             except (TypeError, ValueError):
                 fits = False
             if not fits:
@@ -102,7 +97,7 @@ class Style:
                 raise ValueError(
                     f"field: a function of {field.dim} components; give one real number"
                 )
-            return Field("field", "", field, lambda values: values[:, 0])
+            return Field("field", "", field)
         choice = f"give a CoefficientFunction or one of {', '.join(known)}"
         if not isinstance(field, str):
             raise TypeError(f"field = {field!r}: {choice}")
@@ -117,7 +112,7 @@ class Field(NamedTuple):
     label: str
     kind: str
     read: ng.CoefficientFunction
-    of: Callable[[Array], Array]  # (k,), of nodal values (k, dim)
+    of: Callable[[Array], Array] = np.ravel  # (k,), of nodal values (k, dim)
 
     def values(self, nodes: Nodes) -> Array:
         """Values (k,) at the nodes of a picture."""
@@ -138,25 +133,26 @@ def fields(solution: Solved) -> dict[str, Field]:
     if solution.stress_free:
         stress = 0.0 * stress  # round-off has no colours
 
-    def component(number: int) -> Callable[[Array], Array]:
-        return lambda values: np.asarray(values[:, number])
-
-    stresses: dict[str, tuple[str, Callable[[Array], Array]]] = {
-        "von_mises": ("von Mises stress", von_mises),
-        **{f"stress_{a}": (f"stress {a}", component(k)) for k, a in enumerate(names)},
-        "largest_principal": ("largest principal stress", lambda s: principal_stresses(s)[:, 0]),
-        "smallest_principal": ("smallest principal stress", lambda s: principal_stresses(s)[:, 2]),
-        "mean_pressure": ("mean pressure, −tr σ/3", lambda s: -s[:, [0, 1, 3]].sum(axis=1) / 3),
-    }
-    moves: dict[str, tuple[str, Callable[[Array], Array]]] = {
-        "displacement": ("displacement, absolute value", lambda u: np.linalg.norm(u, axis=1)),
+    return {
+        "von_mises": Field("von Mises stress", "stress", stress, von_mises),
+        **{f"stress_{a}": Field(f"stress {a}", "stress", stress[k]) for k, a in enumerate(names)},
+        "largest_principal": Field(
+            "largest principal stress", "stress", stress, lambda s: principal_stresses(s)[:, 0]
+        ),
+        "smallest_principal": Field(
+            "smallest principal stress", "stress", stress, lambda s: principal_stresses(s)[:, 2]
+        ),
+        "mean_pressure": Field(
+            "mean pressure, −tr σ/3", "stress", -(stress[0] + stress[1] + stress[3]) / 3
+        ),
+        "displacement": Field(
+            "displacement, absolute value", "length", move, lambda u: np.linalg.norm(u, axis=1)
+        ),
         **{
-            f"displacement_{a}": (f"displacement along {a}", component(k))
+            f"displacement_{a}": Field(f"displacement along {a}", "length", move[k])
             for k, a in enumerate((x, y, *z))
         },
     }
-    found = {name: Field(label, "stress", stress, of) for name, (label, of) in stresses.items()}
-    return found | {name: Field(label, "length", move, of) for name, (label, of) in moves.items()}
 
 
 class ContactPath(NamedTuple):
@@ -209,13 +205,11 @@ def zones_of(solution: Solved, lines: Sequence[ContactPath]) -> list[ContactPath
     return zones
 
 
-@dataclass(frozen=True, eq=False)
-class SymmetryLine:
+class SymmetryLine(NamedTuple):
     """A straight line."""
 
     point: Array  # (2,)
     normal: Array  # (2,), unit vector
-    slack: float  # distance up to which points lie on it, a length
 
     def distance(self, x: Array) -> Array:
         """Signed distances (...,) of points `x` (..., 2)."""
@@ -226,8 +220,12 @@ class SymmetryLine:
         return np.asarray(x - 2 * self.distance(x)[:, None] * self.normal)
 
 
-def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) -> SymmetryLine:
-    """The line of symmetry on which a boundary lies; raises ``ValueError`` where it is none."""
+def symmetry_line(solution: Solved, pattern: str, place: Array, slack: float) -> SymmetryLine:
+    """The line of symmetry on which a boundary lies; raises ``ValueError`` where it is none.
+
+    To both sides of it, farther than a `slack`, there are no nodes of those at `place` (n, 2).
+    """
+    mesh, displacement = solution.mesh, solution.displacement
     region = mesh.Boundaries(pattern)
     if not any(region.Mask()):
         names = sorted(set(mesh.GetBoundaries()))
@@ -237,18 +235,16 @@ def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) ->
     found = np.asarray(read, dtype=float).reshape(-1, 4)
     x, u = found[:, :2], found[:, 2:]
     middle = x.mean(axis=0)
-    _, _, axes = np.linalg.svd(x - middle, full_matrices=False)
-    vertices = MeshArrays(mesh).vertices
-    line = SymmetryLine(middle, axes[1], STRAIGHT * float(np.ptp(vertices, axis=0).max()))
-    if (np.abs(line.distance(x)) > line.slack).any():
+    line = SymmetryLine(middle, np.linalg.svd(x - middle, full_matrices=False)[2][1])
+    if (np.abs(line.distance(x)) > slack).any():
         raise ValueError(f'mirror = "{pattern}" is not straight: give a boundary on one line')
     away = np.abs(u @ line.normal).max()
     if away > SYMMETRY_ROUND_OFF * np.abs(displacement.vec.FV().NumPy()).max():
         raise ValueError(
             f'mirror = "{pattern}" moves across its line by {away:.3g}: it is no line of symmetry'
         )
-    sides = line.distance(vertices)
-    if (sides > line.slack).any() and (sides < -line.slack).any():
+    sides = line.distance(place)
+    if sides.min() < -slack and sides.max() > slack:
         raise ValueError(f'mirror = "{pattern}": bodies lie on both sides of its line')
     return line
 
@@ -265,20 +261,17 @@ class Scene:
     triangles: Index  # (t, 3), nodes
     edges: Index  # (e, order + 1), nodes of each element edge
     outline: Mask  # (e,), edges that bound a body
-    zones: list[Array]  # (c, 2) each, points in contact, moved; those of the largest force first
+    lines: list[ContactPath]  # the contact lines
+    paths: list[ContactPath]  # zones in contact on them, those of the largest force first
+    zones: list[Array]  # (c, 2) each, the same points, moved
     scale: float
-
-    def areas(self) -> Array:
-        """Areas (t,) of the triangles."""
-        corners = self.moved[self.triangles]
-        return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
 
 
 def picture(solution: Solved, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
     shown = style.shown(solution)
     mesh = solution.mesh
-    order = max(mesh.GetCurveOrder(), solution.order)
+    order = order_of(solution.mesh, solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
         order = int(np.clip(np.sqrt(MAX_TRIANGLES / mesh.ne), 1, 2 * order))
     nodes = nodes_of(mesh, order)
@@ -287,10 +280,9 @@ def picture(solution: Solved, style: Style) -> Scene:
     ends = np.sort(edges[:, [0, -1]], axis=1)
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
     place, moved, scale = moved_nodes(solution, nodes, style)
-    zones = [zone.rows for zone in zones_of(solution, contact_lines(solution))]
-    zones.sort(key=lambda rows: -float(np.abs(solution.force[rows]).sum()))
-    tree = KDTree(place)
-    at = [tree.query(solution.points[rows])[1].astype(int) for rows in zones]
+    lines = contact_lines(solution)
+    paths, tree = zones_of(solution, lines), KDTree(place)
+    paths.sort(key=lambda zone: -float(np.abs(solution.force[zone.rows]).sum()))
     scene = Scene(
         solution=solution,
         style=style,
@@ -300,20 +292,24 @@ def picture(solution: Solved, style: Style) -> Scene:
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
         edges=edges[first],
         outline=count == 1,
-        zones=[moved[zone] for zone in at],
+        lines=lines,
+        paths=paths,
+        zones=[moved[tree.query(solution.points[zone.rows])[1]] for zone in paths],
         scale=scale,
     )
+    slack = STRAIGHT * float(np.ptp(place, axis=0).max())
     if solution.problem.model in ABOUT_AN_AXIS:
-        slack = STRAIGHT * float(np.abs(place).max(initial=0.0))
-        return _mirrored(scene, SymmetryLine(np.zeros(2), np.array([1.0, 0.0]), slack), place)
-    if style.mirror is None:
+        line = SymmetryLine(np.zeros(2), np.array([1.0, 0.0]))
+    elif style.mirror is None:
         return scene
-    return _mirrored(scene, symmetry_line(mesh, solution.displacement, style.mirror), place)
+    else:
+        line = symmetry_line(solution, style.mirror, place, slack)
+    return _mirrored(scene, line, np.abs(line.distance(place)) <= slack)
 
 
-def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
-    """A scene on both sides of a line of symmetry; `place` (k, 2) are its nodes before."""
-    inside = (np.abs(line.distance(place)) <= line.slack)[scene.edges].all(axis=1)
+def _mirrored(scene: Scene, line: SymmetryLine, on_line: Mask) -> Scene:
+    """A scene on both sides of a line of symmetry, where the nodes `on_line` (k,) lie."""
+    inside = on_line[scene.edges].all(axis=1)
     count = len(scene.moved)
     zones = []
     for zone in scene.zones:
@@ -334,34 +330,29 @@ def moved_nodes(solution: Solved, nodes: Nodes, style: Style) -> tuple[Array, Ar
     """Places (k, d) of nodes before and (k, d) after displacement, and the factor on that."""
     d = solution.mesh.dim
     found = nodes.values(ng.CF((*(ng.x, ng.y, ng.z)[:d], *solution.displacement)))
-    place, move, scale = found[:, :d], found[:, d:], style.scale
-    if scale is None:
-        body = np.empty(len(place), dtype=np.intp)
-        body[nodes.cells] = nodes.body[:, None]
-        scale = _chosen_scale(solution, place, move, body)
+    place, move = found[:, :d], found[:, d:]
+    scale = _chosen_scale(solution, place, move) if style.scale is None else style.scale
     return place, place + scale * move, scale
 
 
-def _chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
+def _chosen_scale(solution: Solved, place: Array, move: Array) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
-    Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
-    to the nearest node of another body errs on the side of a smaller factor. Where nothing touches
+    Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). Where nothing touches
     half of each gap stays.
     """
     size = np.ptp(place, axis=0).max()
     largest = np.linalg.norm(move, axis=1).max()
     factor = 0.04 * size / largest if largest > 0 else 1.0
-    points, gap = solution.points, solution.gap
-    if len(points) and np.ptp(body) > 0:
-        overlap = -gap / 2
+    for state in solution.pairs:
+        if state.line.contact.primary is None:
+            continue
+        overlap = -state.gap / 2
         if solution.active.any():
-            zone = np.ptp(points[solution.active], axis=0).max()
-            overlap = np.full(len(gap), 0.003 * max(zone, 0.01 * size))
-        own = body[KDTree(place).query(points)[1]]
-        for k in np.unique(own):
-            initial = KDTree(place[body != k]).query(points[own == k])[0]
-            closed = np.maximum(initial - gap[own == k], 1e-12 * size)
-            factor = min(factor, ((initial + overlap[own == k]) / closed).min())
+            zone = np.ptp(solution.points[solution.active], axis=0).max()
+            overlap = np.full(len(state.gap), 0.003 * max(zone, 0.01 * size))
+        initial = np.abs(state.line.gap)
+        closed = np.maximum(initial - state.gap, 1e-12 * size)
+        factor = min(factor, ((initial + overlap) / closed).min(initial=np.inf))
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(1.0, *(k * power for k in (0.5, 1, 2, 5) if k * power <= factor)))

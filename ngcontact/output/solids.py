@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..solved import Solved
 from .files import check_path
-from .nodes import VTK_CELLS, nodes_of, sized
+from .nodes import nodes_of, order_of, sized, through
 from .pictures import (
     COLOURS,
     DIVERGING,
@@ -22,7 +22,7 @@ from .pictures import (
     new_figure,
     show,
 )
-from .scene import AXES, STRAIGHT, Style, moved_nodes
+from .scene import AXES, STRAIGHT, Field, Style, moved_nodes
 from .surface import ContactSurface, contact_surface
 
 if TYPE_CHECKING:
@@ -63,8 +63,8 @@ class Zone(NamedTuple):
     """The contact zone of a pair, and the planes that cut it."""
 
     surface: ContactSurface
-    pressure: Array  # (n,), at the nodes of the surface
-    middle: Array  # (3,), in planes of symmetry that cut it, a length
+    mesh: pyvista.PolyData  # the same as triangles, with the pressure at the nodes
+    middle: Array  # (3,), on it and in planes of symmetry that cut it, a length
     half: float  # half-size, a length
     frame: Array  # (3, 3), rows: two tangents, along axes where possible, and the normal
     cuts: list[Cut]  # those that face the viewer first
@@ -80,14 +80,14 @@ def plot_solids(
     style = Style(scale, **options)
     if style.mirror is not None:
         raise ValueError(f'mirror = "{style.mirror}": solids are not mirrored; leave it out')
-    target, _ = None if path is None else check_path(path, ".png"), style.shown(solution)
+    target, shown = None if path is None else check_path(path, ".png"), style.shown(solution)
     forces = [float(pair.force.sum()) if pair.gap.size else -np.inf for pair in solution.pairs]
     pair, pairs = int(np.argmax(forces)) if forces else 0, solution.problem.contact
     zone = _zone(solution, pair) if len(solution.points) else None
     figure = new_figure(target, figsize=(12, 9.5 if zone else 6))
     close = zone is not None and zone.half < CLOSE_UP_SIZE * float(np.ptp(zone.surface.trace.curve))
     parts = figure.subplot_mosaic(("bc;ps" if close else "bb;ps") if zone else "b")
-    _draw_bodies(figure, parts, solution, style, zone)
+    _draw_bodies(figure, parts, solution, style, shown, zone)
     if zone is not None:
         name = pairs[pair].secondary
         if len(pairs) > 1:
@@ -98,12 +98,14 @@ def plot_solids(
             parts["p"].plot(*seen.T, color=COLOURS[0], lw=2, label="" if k else "end of contact")
             parts["p"].legend()
         _draw_profiles(parts["s"], style, zone)
-    show(figure, target, bbox_inches="tight", pad_inches=0.05)
+    show(figure, target)
     return figure
 
 
 def _zone(solution: Solved, pair: int) -> Zone:
     """The contact zone of one pair; its whole surface where no point is in contact."""
+    import pyvista
+
     surface, state = contact_surface(solution, pair), solution.pairs[pair]
     touches = state.active if state.active.any() else np.ones(state.gap.size, dtype=bool)
     weight, place = np.where(touches, state.line.weight, 0.0), state.line.position
@@ -124,18 +126,14 @@ def _zone(solution: Solved, pair: int) -> Zone:
     frame = np.array([first, second * np.copysign(1.0, second @ other), np.zeros(3)])
     frame[:2] /= np.linalg.norm(frame[:2], axis=1)[:, None]
     frame[2], surface = np.cross(*frame[:2]), surface.looking(d)
-    corners = surface.points[surface.nodes[:, :3]]
-    centre = corners.mean(axis=1)
-    radius = np.linalg.norm((corners - centre[:, None]) @ frame[:2].T, axis=2).max(axis=1)
-    beside = np.linalg.norm((centre - middle) @ frame[:2].T, axis=1) / radius
-    if beside.min() > 1:  # in the air between two zones
-        middle = centre[beside.argmin()]
+    mesh = pyvista.PolyData(surface.points, faces=sized(surface.triangles))
+    mesh["pressure"] = surface.pressure(solution)
+    _, middle = mesh.find_closest_cell(middle, return_closest_point=True)  # of two zones on one
     half = float(np.linalg.norm(place[touches] - middle, axis=1).max())
     cuts = cuts or [
         Cut(middle, axis * np.copysign(1.0, axis @ FRONT), False) for axis in frame[1::-1]
     ]
-    pressure = surface.pressure(solution)
-    return Zone(surface, pressure, middle, max(half, LEAST_SIZE * size), frame, cuts)
+    return Zone(surface, mesh, middle, max(half, LEAST_SIZE * size), frame, cuts)
 
 
 def _symmetry_planes(solution: Solved, slack: float) -> list[tuple[Array, Array]]:
@@ -154,34 +152,28 @@ def _symmetry_planes(solution: Solved, slack: float) -> list[tuple[Array, Array]
     return found
 
 
-def _grid(
-    solution: Solved, style: Style
-) -> tuple[pyvista.UnstructuredGrid, pyvista.PolyData, float]:
-    """Deformed bodies with the field as point data "shown", edges on their surface, the scale."""
-    import pyvista
-    from vtkmodules.vtkFiltersGeometry import vtkUnstructuredGridGeometryFilter
-
-    order, shown = max(solution.mesh.GetCurveOrder(), solution.order), style.shown(solution)
-    nodes = nodes_of(solution.mesh, order)
-    _, moved, scale = moved_nodes(solution, nodes, style)
-    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][min(order, 3) - 1]: nodes.cells}, moved)
-    grid.point_data["shown"] = shown.values(nodes) / style.unit(shown.kind)[1]
-    outside = vtkUnstructuredGridGeometryFilter()
-    outside.SetInputData(grid)
-    outside.Update()
-    return grid, pyvista.wrap(outside.GetOutput()).extract_all_edges(), scale
-
-
 def _draw_bodies(
-    figure: Figure, parts: dict[str, Axes], solution: Solved, style: Style, zone: Zone | None
+    figure: Figure,
+    parts: dict[str, Axes],
+    solution: Solved,
+    style: Style,
+    shown: Field,
+    zone: Zone | None,
 ) -> None:
     """The bodies, cut open at the `zone`, and a close-up of it if `parts` has axes "c"."""
-    import pyvista
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
+    from vtkmodules.vtkFiltersGeometry import (
+        vtkDataSetSurfaceFilter,
+        vtkUnstructuredGridGeometryFilter,
+    )
 
-    (grid, edges, scale), shown = _grid(solution, style), style.shown(solution)
+    unit = style.unit(shown.kind)[1]
+    nodes = nodes_of(solution.mesh, order_of(solution.mesh, solution.order))
+    _, moved, scale = moved_nodes(solution, nodes, style)
+    grid = nodes.grid(moved)
+    grid.point_data["shown"] = shown.values(nodes) / unit
+    edges = through(vtkUnstructuredGridGeometryFilter(), grid).extract_all_edges()
     ends = grid.get_data_range("shown")
     normals = [cut.normal for cut in zone.cuts] if zone else [FRONT]
     if zone and not zone.cuts[0].symmetry:
@@ -194,23 +186,18 @@ def _draw_bodies(
     eye = eye / np.linalg.norm(eye)
     right = np.cross(UP, eye) / np.linalg.norm(np.cross(UP, eye))
     frame = np.array([right, np.cross(eye, right), eye])
-    filtered = vtkDataSetSurfaceFilter()
-    filtered.SetInputData(grid)
-    filtered.SetNonlinearSubdivisionLevel(SUBDIVISIONS)
-    filtered.Update()
-    surface = pyvista.wrap(filtered.GetOutput()).triangulate()
+    outside = vtkDataSetSurfaceFilter()
+    outside.SetNonlinearSubdivisionLevel(SUBDIVISIONS)
+    surface = through(outside, grid).triangulate()
     surface["shown"] = np.clip(surface["shown"], *ends)  # between nodes polynomials overshoot
     values, triangles = np.asarray(surface["shown"]), surface.faces.reshape(-1, 4)[:, 1:]
     seen = surface.points @ frame[:2].T
-    windows, near = [(seen.min(axis=0), seen.max(axis=0))], []
+    windows = [(seen.min(axis=0), seen.max(axis=0))]
     if zone and "c" in parts:
         middle, half = frame[:2] @ zone.middle, (1 + 2 * ZONE_MARGIN) * zone.half
         windows.append((middle - half, middle + half))
-        apart = np.linalg.norm(surface.points[triangles].mean(axis=1) - zone.middle, axis=1)
-        near.append(apart < half)
-    areas, (_, unit) = np.asarray(surface.compute_cell_sizes()["Area"]), style.unit(shown.kind)
     given = style.limits and (style.limits[0] / unit, style.limits[1] / unit)
-    limits = given or colour_limits(values, triangles, areas, near)
+    limits = given or colour_limits(values, triangles, seen, windows[1:])
     colours = DIVERGING if limits[0] < 0 < limits[1] else SEQUENTIAL
     meshes = [(surface, {"scalars": "shown", "cmap": colours, "clim": limits, **LIGHT})]
     ahead = 1e-3 * surface.length * eye  # lines in front of the surface
@@ -280,7 +267,7 @@ def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: s
 
     surface, (_, length), (_, stress) = zone.surface, style.unit("length"), style.unit("stress")
     seen, middle = (x @ zone.frame[:2].T / length for x in (surface.points, zone.middle))
-    values, half = zone.pressure / stress, (1 + ZONE_MARGIN) * zone.half / length
+    values, half = zone.mesh["pressure"] / stress, (1 + ZONE_MARGIN) * zone.half / length
     top = float(values.max(initial=0.0)) or 1.0
     drawing = {"shading": "gouraud", "cmap": PRESSURE_COLOURS, "vmin": 0.0, "vmax": top}
     shading = axes.tripcolor(Triangulation(*seen.T, surface.triangles), values, **drawing)
@@ -300,11 +287,7 @@ def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: s
 
 def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
     """The pressure along the cuts."""
-    import pyvista
-
-    surface, (_, length), (_, stress) = zone.surface, style.unit("length"), style.unit("stress")
-    data = pyvista.PolyData(surface.points, faces=sized(surface.triangles))
-    data.point_data["pressure"] = zone.pressure / stress
+    (_, length), (_, stress), data = style.unit("length"), style.unit("stress"), zone.mesh
     names, ends = [], []
     for k, cut in enumerate(zone.cuts):
         along = np.cross(cut.normal, zone.frame[2])
@@ -316,7 +299,9 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         order, half = np.argsort(s), (1 + ZONE_MARGIN) * zone.half
         names.append(_name(along, f"along ({', '.join(f'{x:.2g}' for x in along.round(2) + 0.0)})"))
         apart = 1 + np.flatnonzero(np.diff(piece[order]))  # a line ends where the surface does
-        drawn = (np.insert(x[order], apart, np.nan) for x in (s / length, line["pressure"]))
+        drawn = (
+            np.insert(x[order], apart, np.nan) for x in (s / length, line["pressure"] / stress)
+        )
         axes.plot(*drawn, color=COLOURS[k], label=names[-1])
         ends += list(np.clip(zone.middle @ along + np.array([-half, half]), s.min(), s.max()))
     part = np.array([min(ends), max(ends)])

@@ -13,14 +13,14 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Index
+from ..arrays import Index
 from ..contact import neighbours
 from ..estimator import Estimated
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
-from .files import check_path, replacing, several
-from .nodes import VTK_CELLS, nodes_of, sized, subdivision
+from .files import check_path, replacing
+from .nodes import in_space, nodes_of, order_of, sized, through
 from .surface import contact_surface
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 PLANE: tuple[str, ...] = ("xx", "yy", "xy", "zz")
 MERIDIAN: tuple[str, ...] = ("rr", "zz", "rz", "hoop")
 SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetric tensor
-VTK_WEDGE = 13
 SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at most
 
 
@@ -57,16 +56,16 @@ def write_solution(
     target = check_path(path, ".vtu")
     beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
     from vtkmodules.vtkCommonCore import vtkObject
+    from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
     writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
-    bodies, contact = _bodies(solution), _contact(solution)
+    bodies, contact = _bodies(solution, angle is not None), _contact(solution)
     if angle is not None:
-        parts = subdivision(max(solution.mesh.GetCurveOrder(), solution.order))[0]
-        triangles = bodies.cells.reshape(bodies.n_cells, -1)[:, 1:][:, parts].reshape(-1, 3)
         contact.point_data.pop("force", None)  # of a ring
-        bodies = _revolved(bodies, triangles, angle)
-        contact = _revolved(contact, contact.lines.reshape(-1, 3)[:, 1:], angle)
+        contact.verts = np.zeros(0, dtype=np.intp)
+        bodies = _revolved(bodies, angle)
+        contact = through(vtkGeometryFilter(), _revolved(contact, angle))
     with replacing(target, beside) as drafts:
         for writer, data, draft in zip(writers, (bodies, contact), drafts, strict=True):
             writer.SetFileName(str(draft))
@@ -120,10 +119,17 @@ def write_series(
     time is no number; otherwise as `check_path`, before any work.
     """
     target = check_path(path, ".pvd")
-    clock = None if times is None else iter(_increasing(times))
+    clock = None
+    if times is not None:
+        values = np.array(list(times))
+        if values.dtype.kind not in "iuf":
+            raise TypeError(f"times = {values.tolist()}: give numbers")
+        if not (np.isfinite(values).all() and (np.diff(values) > 0).all()):
+            raise ValueError(f"times = {values.tolist()}: give finite, increasing numbers")
+        clock = iter(values.tolist())
     root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     collection = ET.SubElement(root, "Collection")
-    for level, solution in enumerate(several(solutions)):
+    for level, solution in enumerate(solutions):
         time = float(level) if clock is None else next(clock, None)
         if time is None:
             raise ValueError(f"times has {level} entries, fewer than there are solutions")
@@ -142,36 +148,18 @@ def write_series(
     return target
 
 
-def _increasing(times: Iterable[float]) -> list[float]:
-    """Finite increasing numbers."""
-    values = list(times)
-    for before, time in zip([None, *values], values, strict=False):
-        if isinstance(time, bool) or not isinstance(time, int | float | np.number):
-            raise TypeError(f"times hold {time!r}: give numbers")
-        if not np.isfinite(time) or (before is not None and not time > before):
-            raise ValueError(f"times hold {time} after {before}: give finite, increasing numbers")
-    return [float(time) for time in values]
-
-
-def _in_space(vectors: Array) -> Array:
-    """Vectors (k, d) with a third component 0 in the plane."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
-
-
-def _bodies(solution: Estimated) -> pyvista.UnstructuredGrid:
-    """Bodies with their fields, curved elements."""
-    import pyvista
-
-    order, d = max(solution.mesh.GetCurveOrder(), solution.order), solution.mesh.dim
-    nodes, place = nodes_of(solution.mesh, order), (ng.x, ng.y, ng.z)[:d]
+def _bodies(solution: Estimated, linear: bool) -> pyvista.UnstructuredGrid:
+    """Bodies with their fields: curved elements, or `linear` triangles in their place."""
+    d, nodes = solution.mesh.dim, nodes_of(solution.mesh, order_of(solution.mesh, solution.order))
+    place = (ng.x, ng.y, ng.z)[:d]
     values = nodes.values(ng.CF((*place, solution.displacement, full_stress(solution))))
     about_an_axis = solution.problem.model in ABOUT_AN_AXIS
     components, names = [0, 1, 2, 3], MERIDIAN if about_an_axis else PLANE
     if d == 3:
         components, names = [0, 1, 3, 2, 4, 5], SOLID
-    cells = {VTK_CELLS[d][min(order, 3) - 1]: nodes.cells}
-    grid, stress = pyvista.UnstructuredGrid(cells, _in_space(values[:, :d])), values[:, 2 * d :]
-    grid.point_data["displacement"] = _in_space(values[:, d : 2 * d])
+    nodes = nodes.divided() if linear else nodes
+    grid, stress = nodes.grid(values[:, :d]), values[:, 2 * d :]
+    grid.point_data["displacement"] = in_space(values[:, d : 2 * d])
     grid.point_data["stress"] = stress[:, components]
     for k, name in enumerate(names):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, name)
@@ -182,7 +170,8 @@ def _bodies(solution: Estimated) -> pyvista.UnstructuredGrid:
     grid.field_data["body_names"] = list(nodes.names)
     _name_pairs(grid, solution)
     if solution.estimated:
-        grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
+        indicators = np.asarray(solution.indicators, dtype=float)
+        grid.cell_data["indicators"] = np.repeat(indicators, grid.n_cells // len(indicators))
     return grid
 
 
@@ -221,45 +210,31 @@ def _contact(solution: Solved) -> pyvista.PolyData:
             cells.append(rows[neighbours(solution.pairs[pair].line)])
     if m:
         joined = {"faces" if solid else "lines": sized(np.concatenate(cells))}
-        data = pyvista.PolyData(_in_space(points), verts=sized(np.arange(m)[:, None]), **joined)
+        data = pyvista.PolyData(in_space(points), verts=sized(np.arange(m)[:, None]), **joined)
     for name, known in fields.items() if m else ():
-        data.point_data[name] = _in_space(known) if known.ndim == 2 else known
+        data.point_data[name] = in_space(known) if known.ndim == 2 else known
     _name_pairs(data, solution)
     return data
 
 
-def _revolved(section: Any, cells: Index, angle: float) -> Any:
-    """What `cells` (k, n) of points of a meridian section pass over, triangles or lines."""
-    import pyvista
+def _revolved(section: Any, angle: float) -> Any:
+    """What the cells of a meridian section pass over, triangles or lines."""
+    from vtkmodules.vtkFiltersModeling import vtkVolumeOfRevolutionFilter
 
     if not section.n_points:
         return section
-    steps = max(3, math.ceil(angle / SECTION_ANGLE))
-    angles = np.deg2rad(angle) / steps * np.arange(steps if angle == 360 else steps + 1)
-    first = np.arange(steps)[:, None, None]
-    one, other = (section.n_points * at + cells for at in (first, (first + 1) % len(angles)))
-
-    def turned(vectors: Array) -> Array:
-        """Vectors (t m, 3) that `vectors` (m, 3) of components r, z are at each of the angles."""
-        r, z, _ = vectors.T
-        x, y = np.outer(np.cos(angles), r), np.outer(np.sin(angles), r)
-        return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=2).reshape(-1, 3)
-
-    if cells.shape[1] == 3:
-        wedges = np.concatenate([other, one], axis=2).reshape(-1, 6)
-        whole: Any = pyvista.UnstructuredGrid({VTK_WEDGE: wedges}, turned(section.points))
-    else:
-        quads = np.concatenate([one, other[..., ::-1]], axis=2).reshape(-1, 4)
-        whole = pyvista.PolyData(turned(section.points), faces=sized(quads))
+    turning, steps = vtkVolumeOfRevolutionFilter(), max(3, math.ceil(angle / SECTION_ANGLE))
+    turning.SetSweepAngle(angle)
+    turning.SetResolution(steps)
+    turning.SetOutputPointsPrecision(turning.DOUBLE_PRECISION)
+    section.points = section.points[:, [0, 2, 1]]
+    whole = through(turning, section)
+    turn = np.deg2rad(angle) / steps * np.arange(whole.n_points // section.n_points)
     for name, known in section.point_data.items():
-        vectors = known.shape[1:] == (3,)
-        whole.point_data[name] = turned(known) if vectors else np.concatenate([known] * len(angles))
-        source, target = (x.GetPointData().GetAbstractArray(name) for x in (section, whole))
-        target.CopyComponentNames(source)
-    for name, known in section.cell_data.items():
-        whole.cell_data[name] = np.tile(np.repeat(known, len(cells) // len(known)), steps)
-    for name in section.field_data:
-        whole.field_data[name] = list(section.field_data[name])
+        if known.shape[1:] == (3,):
+            r, z, _ = known.T
+            x, y, z = np.outer(np.cos(turn), r), np.outer(np.sin(turn), r), np.tile(z, len(turn))
+            whole.point_data[name] = np.column_stack([x.ravel(), y.ravel(), z])
     return whole
 
 

@@ -96,21 +96,20 @@ def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
 
 def read(path: str | os.PathLike[str], version: str) -> Any:
     """The solution that `save` wrote to `path`."""
-    source = Path(path)
+    source, header = Path(path), None
     try:
         with gzip.open(source, "rb") as file:
             header = pickle.load(file)
             if not isinstance(header, dict) or header.get("format") != FORMAT:
                 raise ValueError(f"{str(source)!r} is of another format: {header!r:.80}")
-            try:
-                return pickle.load(file)
-            except (AttributeError, ImportError, TypeError, KeyError) as error:
-                raise ValueError(
-                    f"{str(source)!r} was written by ngcontact {header.get('ngcontact')} and "
-                    f"cannot be read by {version}, or needs a module that is missing here: {error}"
-                ) from error
+            return pickle.load(file)
     except (gzip.BadGzipFile, EOFError, pickle.UnpicklingError) as error:
         raise ValueError(
             f"{str(source)!r} is no complete result of ngcontact ({error}): give a file written "
             "by Solution.save"
+        ) from error
+    except (AttributeError, ImportError, TypeError, KeyError) as error:
+        raise ValueError(
+            f"{str(source)!r}, of {header}, cannot be read by ngcontact {version}, or needs a "
+            f"module that is missing here: {error}"
         ) from error

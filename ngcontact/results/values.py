@@ -41,82 +41,66 @@ class Location:
 
 def locate(trace: BoundaryTrace, points: Array) -> Location:
     """Elements that contain `points` (k, d), or lie beside those between the mesh and the CAD."""
-    finder = _Finder(trace)
-    chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // POINTS_AT_ONCE)))
-    return joined([finder.find(points, at) for at in chunks])
+    view = MeshArrays(trace.mesh)
+    corners, middle = view.corners, view.corners.mean(axis=1)
+    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * CURVED_RADIUS
+    size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
+    # Boundary facet (ne, d + 1) opposite to each vertex of an element; -1 inside.
+    keys, known = view.keys(view.sides), view.keys(view.facets)
+    order = np.argsort(known)
+    at = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
+    facet = np.where(known[order][at] == keys, order[at], -1)[:, OPPOSITE[view.dim]]
 
-
-class _Finder:
-    """A mesh, prepared for a search."""
-
-    def __init__(self, trace: BoundaryTrace) -> None:
-        self.trace, self.mesh = trace, trace.mesh
-        view = MeshArrays(trace.mesh)
-        self.body = view.bodies
-        self.corners, self.curved = view.corners, trace.geometry_order > 1
-        middle = self.corners.mean(axis=1)
-        radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1) * CURVED_RADIUS
-        self.size = np.linalg.norm(np.ptp(self.corners, axis=1), axis=1)
-        # Elements of about one size at a time: large ones are near many points, small ones few.
-        octave = np.frexp(radius)[1]
-        groups = [np.flatnonzero(octave == k) for k in np.unique(octave)]
-        self.groups = [(at, KDTree(middle[at]), float(radius[at].max())) for at in groups]
-        # Boundary facet (ne, d + 1) opposite to each vertex of an element; -1 inside.
-        keys, known = view.keys(view.sides), view.keys(view.facets)
-        order = np.argsort(known)
-        at = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
-        found = np.where(known[order][at] == keys, order[at], -1)
-        self.facet = found[:, OPPOSITE[view.dim]]
-
-    def find(self, points: Array, at: Index) -> Location:
-        """Elements of the points numbered `at` (j,) among `points` (k, d)."""
-        found: list[tuple[Index, Index]] = [(np.zeros(0, dtype=np.intp),) * 2]
-        tree = KDTree(points[at])
-        for numbers, middles, radius in self.groups if len(at) else ():
-            near = tree.sparse_distance_matrix(middles, radius, output_type="coo_matrix")
-            found.append((at[near.row], numbers[near.col]))
-        point, element = (np.concatenate(part) for part in zip(*found, strict=True))
-        reference = self._references(points[point], element)
+    def located(at: Index) -> Location:
+        """Elements of the points numbered `at` (j,)."""
+        near = KDTree(points[at]).query_ball_point(middle, radius)
+        element = np.repeat(np.arange(len(middle)), [len(numbers) for numbers in near])
+        point = at[np.concatenate(near).astype(np.intp)]
+        reference = _references(trace, corners[element], points[point], element)
         share = np.column_stack([reference, 1 - reference.sum(axis=1)])
         noise = COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1)
-        tolerance = INSIDE_COORDINATE + noise / self.size[element]
+        tolerance = INSIDE_COORDINATE + noise / size[element]
         outside = ~(share >= -tolerance[:, None])  # so a NaN is outside
         inside = ~outside.any(axis=1)
-        key = point * len(self.mesh.GetMaterials()) + self.body[element]
+        key = point * len(trace.mesh.GetMaterials()) + view.bodies[element]
         left = np.flatnonzero(~np.isin(key, key[inside]) & (outside.sum(axis=1) == 1))
-        side = self.facet[element[left], outside[left].argmax(axis=1)]
+        side = facet[element[left], outside[left].argmax(axis=1)]
         left, side = left[side >= 0], side[side >= 0]
-        tolerance = INSIDE_COORDINATE * self.trace.lengths(side) + noise[left]
-        beside = left[self.trace.beyond_cad(side, points[point[left]]) <= tolerance]
+        tolerance = INSIDE_COORDINATE * trace.lengths(side) + noise[left]
+        beside = left[trace.beyond_cad(side, points[point[left]]) <= tolerance]
         rows = np.concatenate([np.flatnonzero(inside), beside])
         rows = rows[np.argsort(point[rows], kind="stable")]
         return Location(point[rows], element[rows], reference[rows])
 
-    def _references(self, points: Array, element: Index) -> Array:
-        """Places (q, d) of `points` (q, d) in the reference elements of elements (q,)."""
-        corners, d = self.corners[element], points.shape[1]
-        jacobian = (corners[:, :-1] - corners[:, -1:]).transpose(0, 2, 1)
-        found = np.linalg.solve(jacobian, (points - corners[:, -1])[:, :, None])
-        reference = np.asarray(found[:, :, 0], dtype=float)
-        if not self.curved:
-            return reference
-        near = np.flatnonzero(((reference > -2) & (reference < 3)).all(axis=1))
-        reference[np.setdiff1d(np.arange(len(reference)), near)] = np.nan
-        mapped = ng.CF(((ng.x, ng.y, ng.z)[:d], ng.specialcf.JacobianMatrix(d, d)))
-        elements = SampledElements(self.mesh, d)
-        for _ in range(STEPS):
-            if not len(near):
-                break
-            values = elements.evaluate(mapped, element[near], reference[near, None])[:, 0]
-            miss = points[near] - values[:, :d]
-            slopes = values[:, d:].reshape(-1, d, d)
-            slopes[np.linalg.det(slopes) == 0] = np.nan
-            step = np.linalg.solve(slopes, miss[..., None])[..., 0]
-            step = np.clip(np.nan_to_num(step), -0.5, 0.5)
-            reference[near] = np.clip(reference[near] + step, -2, 3)
-            near = near[np.abs(step).max(axis=1) > INSIDE_COORDINATE / 100]
-        reference[near] = np.nan  # where elements do not reach
+    chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // POINTS_AT_ONCE)))
+    return joined([located(at) for at in chunks])
+
+
+def _references(trace: BoundaryTrace, corners: Array, points: Array, element: Index) -> Array:
+    """Places (q, d) of `points` (q, d) in reference elements; `corners` (q, d + 1, d) of these."""
+    d = points.shape[1]
+    jacobian = (corners[:, :-1] - corners[:, -1:]).transpose(0, 2, 1)
+    found = np.linalg.solve(jacobian, (points - corners[:, -1])[:, :, None])
+    reference = np.asarray(found[:, :, 0], dtype=float)
+    if trace.geometry_order == 1:
         return reference
+    near = np.flatnonzero(((reference > -2) & (reference < 3)).all(axis=1))
+    reference[np.setdiff1d(np.arange(len(reference)), near)] = np.nan
+    mapped = ng.CF(((ng.x, ng.y, ng.z)[:d], ng.specialcf.JacobianMatrix(d, d)))
+    elements = SampledElements(trace.mesh, d)
+    for _ in range(STEPS):
+        if not len(near):
+            break
+        values = elements.evaluate(mapped, element[near], reference[near, None])[:, 0]
+        miss = points[near] - values[:, :d]
+        slopes = values[:, d:].reshape(-1, d, d)
+        slopes[np.linalg.det(slopes) == 0] = np.nan
+        step = np.linalg.solve(slopes, miss[..., None])[..., 0]
+        step = np.clip(np.nan_to_num(step), -0.5, 0.5)
+        reference[near] = np.clip(reference[near] + step, -2, 3)
+        near = near[np.abs(step).max(axis=1) > INSIDE_COORDINATE / 100]
+    reference[near] = np.nan  # where elements do not reach
+    return reference
 
 
 @dataclass(frozen=True, eq=False)
