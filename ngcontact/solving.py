@@ -48,7 +48,7 @@ from .plausibility import (
     warn_of_implausible,
 )
 from .problem import Contact, MeshArrays, Problem
-from .quadrature import evaluations, sample_data, unresolved, warn_of_unresolved
+from .quadrature import evaluations, sample_data, unresolved
 from .results import with_progress
 from .solution import Solution
 from .solved import made_of
@@ -511,7 +511,8 @@ def warn_of_pairs(solution: Solution, issued: set[object], *, last: bool) -> Non
             warn(message)
     issued.update(found)
     if last:
-        warn_of_unresolved(solution.problem, solution.mesh)
+        for one in unresolved(solution.problem, solution.mesh):
+            warn(f"{one}: the solution hardly knows of it; refine the mesh there, or take `adapt`")
 
 
 def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:

@@ -7,7 +7,6 @@ from .cells import lattice as lattice
 from .cells import local_functions as local_functions
 from .features import features_of as features_of
 from .features import unresolved as unresolved
-from .features import warn_of_unresolved as warn_of_unresolved
 from .features import where_features_are as where_features_are
 from .loads import Load as Load
 from .loads import has_rough_loads as has_rough_loads

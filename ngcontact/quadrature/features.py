@@ -24,7 +24,6 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, joined, rows_of
-from ..errors import warn
 from ..problem import POSITION, Problem, numbers, varies
 from .cells import ElementParts, SampledElements, lattice, sampled
 
@@ -540,9 +539,3 @@ def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> d
         )
         found[words] = elements | found.get(words, False)
     return found
-
-
-def warn_of_unresolved(problem: Problem, mesh: ng.Mesh) -> None:
-    """Warn of functions with features that a mesh does not show."""
-    for one in unresolved(problem, mesh):
-        warn(f"{one}: the solution hardly knows of it; refine the mesh there, or take `adapt`")
