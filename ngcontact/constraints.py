@@ -112,11 +112,8 @@ class Rows:
 
     def alike(self, first: int, second: int) -> bool:
         """Whether two rows have the same left side."""
-        e = self.entries
-        difference = np.zeros((self.coupling.shape[1], self.direction.shape[1]))
-        for row, sign in ((first, 1), (second, -1)):
-            difference[e.node[e.row == row]] += sign * e.coefficient[e.row == row]
-        return bool(np.abs(difference).max() <= ROW_DIFFERENCE)
+        difference = self.matrix[[first]] - self.matrix[[second]]
+        return bool(np.abs(difference.data).max(initial=0.0) <= ROW_DIFFERENCE)
 
 
 def no_rows(n: int, d: int = 2) -> Rows:

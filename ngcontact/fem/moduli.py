@@ -149,8 +149,8 @@ class RoughElements:
     values: Array  # (k, n, q q), or (k, n, c), at the points of a lattice
     limit: Array  # (k,), of a change
 
-    def jumps(self) -> dict[int, tuple[Array, Array]]:
-        """Places (2,), and values (2,) on both sides, by number of the element, one in each.
+    def jumps(self) -> list[tuple[Array, Array]]:
+        """Places (2,), and values (2,) on both sides, one in each element that has any.
 
         From the points of a lattice at which a component is least and largest, the half of their
         distance across which it changes more is kept, again and again: a smooth change shrinks by
@@ -167,7 +167,7 @@ class RoughElements:
             x[row, side], u[row, side] = middle, v
         kept = np.ptp(u, axis=1) > self.limit
         places = self.view.positions(self.at[kept], x[kept, 0])
-        return dict(zip(self.at[kept], zip(places, u[kept], strict=True), strict=True))
+        return list(zip(places, u[kept], strict=True))
 
 
 def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements]]:
@@ -203,7 +203,7 @@ def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of every law, or strain, that jumps inside elements, where it jumps most."""
     jumps: dict[str, list[tuple[Array, Array]]] = {}
     for pattern, elements in _rough(problem, mesh):
-        jumps.setdefault(pattern, []).extend(elements.jumps().values())
+        jumps.setdefault(pattern, []).extend(elements.jumps())
     for pattern, found in jumps.items():
         if found:
             (x, y), sides = max(found, key=lambda jump: float(np.ptp(jump[1])))
