@@ -35,6 +35,8 @@ INTEGRAL_ERROR = {1: 1e-8, 2: 1e-6}
 MOMENTS = {1: (7, 3), 2: (4, 2)}
 INTEGRALS = {1: (15, 6), 2: (10, 5)}
 
+COUNTED = {"points": 0}  # by `sampled`
+
 Integrand = Callable[[Index, Array], Array]  # values (k, m, c) at (k, m, dim) of elements (k,)
 
 
@@ -238,20 +240,14 @@ def local_functions(space: ng.FESpace, numbers: Index) -> ng.CoefficientFunction
     return ng.CF(tuple(functions))
 
 
-class _Count:
-    """Points since the start of the process."""
-
-    points = 0
-
-
 def evaluations() -> int:
     """Points at which data were looked at since the start of the process."""
-    return _Count.points
+    return COUNTED["points"]
 
 
 def sampled(function: ng.CoefficientFunction, points: NDArray) -> Array:
     """Values (..., c) of a function among the data at mesh `points` (j, n) or (n,), counted."""
-    _Count.points += points.size
+    COUNTED["points"] += points.size
     return np.asarray(function(points.ravel())).reshape(*points.shape, function.dim)
 
 
