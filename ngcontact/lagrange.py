@@ -14,7 +14,6 @@ from scipy.special import roots_jacobi
 
 from .arrays import Array, Index
 
-COEFFICIENT_ROUND_OFF = 1e-14  # of coefficients in Legendre's basis, relative to the largest
 END_ROUND_OFF = 1e-12  # of places beyond the ends
 
 
@@ -93,26 +92,21 @@ def _slopes(order: int) -> Array:
 def zeros(order: int, values: Array) -> tuple[Index, Array]:
     """All places in [0, 1] where polynomials vanish: numbers (r,), parameters (r,).
 
-    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points.
+    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points. They are
+    eigenvalues 1 / (s - s_0) of companion matrices of c_0 y^p + c_1 y^(p - 1) + ..., where c are
+    the coefficients in powers of s - s_0: c_0, the value at the node s_0, is the largest there is.
     """
-    number, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
-    coefficients = values @ _coefficients(order).T
-    size = np.abs(coefficients)
-    large = size > COEFFICIENT_ROUND_OFF * size.max(axis=1, keepdims=True)
-    degree = (large * np.arange(order + 1)).max(axis=1)
-    for n in np.unique(degree[degree > 0]).tolist():  # eigenvalues of companion matrices
-        some = np.flatnonzero(degree == n)
-        companion = np.tile(legendre.legcompanion(np.eye(n + 1)[n]), (len(some), 1, 1))
-        scale = np.sqrt((2 * n - 1) / (2 * np.arange(n) + 1)) * n / (2 * n - 1)
-        companion[:, :, -1] -= coefficients[some, :n] / coefficients[some, n : n + 1] * scale
-        roots = np.linalg.eigvals(companion[:, ::-1, ::-1])
-        s = (1 + roots.real) / 2
-        inside = np.isreal(roots) & (np.abs(s - 0.5) <= 0.5 + END_ROUND_OFF)
-        number.append(some[inside.nonzero()[0]])
-        places.append(np.clip(s[inside], 0, 1))
-    found, s = np.concatenate(number), np.concatenate(places)
-    rising = np.lexsort((s, found))
-    return found[rising], s[rising]
+    nodes, first = gauss_lobatto(order), np.abs(values).argmax(axis=1)
+    powers = (nodes - nodes[:, None])[..., None] ** np.arange(order + 1)
+    c = (np.linalg.inv(powers)[first] @ values[..., None])[..., 0]
+    companion = np.tile(np.eye(order, k=-1), (len(c), 1, 1))
+    np.divide(-c[:, 1:], c[:, :1], out=companion[:, 0], where=c[:, :1] != 0)
+    y = np.linalg.eigvals(companion)
+    real = np.isreal(y) & (y != 0)
+    s = nodes[first, None] + np.divide(1.0, y.real, out=np.full(y.shape, np.inf), where=real)
+    s = np.sort(np.where(np.abs(s - 0.5) <= 0.5 + END_ROUND_OFF, s, np.inf), axis=1)
+    number, place = np.isfinite(s).nonzero()
+    return number, s[number, place].clip(0, 1)
 
 
 @lru_cache

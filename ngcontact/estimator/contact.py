@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
+from numpy.polynomial import Polynomial
 
 from ..arrays import Array, Index, Mask, across, chords, joined, rows_of
 from ..contact import (
@@ -20,9 +20,10 @@ from ..contact import (
     jacobian,
     opposite,
     prescribed_gap,
+    rays,
 )
 from ..fem import BoundaryTrace
-from ..lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
+from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,
@@ -42,10 +43,6 @@ SAME_DIRECTION_COSINE = 1 - 1e-6
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas.
 BUMP_FACTOR = 2.0
-UNRESOLVED_GAP = 0.1  # distance of a gap from polynomials over its range, from which it is followed
-OPENING_ROUND_OFF = 1e-12  # ... relative to the gap, below which there is none
-PIECE_DIVISIONS = 4  # of a piece on which the gap is no polynomial
-MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
 
 
 def covered_parts(
@@ -67,85 +64,22 @@ def covered_parts(
         inside = (s > 0) & (s < 1)  # where a vertex of the primary is passed
         ends = np.where(inside, np.round(t), t).reshape(2, -1)
         low[whole:], high[whole:] = np.sort(ends, axis=0)
-    return Parts(
-        np.concatenate([segment, pieces.facing]),
-        np.concatenate([pieces.start, low]),
-        np.concatenate([pieces.stop, high]),
-    )
+    return joined([own, Parts(pieces.facing, low, high)])
 
 
 def remaining(inner: Mask, covered: list[Parts]) -> Parts:
     """Parts of all segments that are not `inner` (q,) which `covered` leaves."""
     outer = np.flatnonzero(~inner)
-    count = len(outer)
     # Every segment as an interval [2 n, 2 n + 1] of one axis; an empty part at both of its ends.
-    ends = Parts(np.concatenate([outer, outer]), *np.repeat([[0.0, 1.0]] * 2, count, axis=1))
-    segment, start, stop = (
-        np.concatenate([getattr(parts, name) for parts in (*covered, ends)])
-        for name in ("segment", "start", "stop")
-    )
-    start, stop = 2 * segment + start, 2 * segment + stop
+    start, stop = np.repeat([[0.0], [1.0]], len(outer), axis=1)
+    every = joined([*covered, Parts(outer, start, start), Parts(outer, stop, stop)])
+    start, stop = 2 * every.segment + every.start, 2 * every.segment + every.stop
     order = np.lexsort((stop, start))
     reached = np.maximum.accumulate(stop[order])
-    low, high, number = reached[:-1], start[order][1:], segment[order]
+    low, high, number = reached[:-1], start[order][1:], every.segment[order]
     left = (number[1:] == number[:-1]) & (high - low > SLIVER)
     number = number[1:][left]
     return Parts(number, low[left] - 2 * number, high[left] - 2 * number)
-
-
-def followed_gap(
-    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, order: int
-) -> FacingPieces:
-    """Pieces divided until `gap` data are polynomials on each, by its Gauss points of `order`.
-
-    Or until there are `MAX_PIECES`. Gaps between measured curves are resolved by those.
-    """
-    gap, rule = line.contact.gap, gauss(order)[0]
-    if gap is None or isinstance(gap, float) or len(pieces.local) == 0:
-        return pieces
-    between, follow = _between(order)
-    places = np.concatenate([rule, between])
-
-    def gap_at(s: Array) -> Array:
-        """Data (r, n) at places `s` (n,) of the pieces (r,), lengths."""
-        segment, places = np.repeat(line.segments[pieces.local], len(s)), pieces.places(s)
-        x = boundary.point(segment, places)
-        return prescribed_gap(line.contact, boundary, segment, places, x).reshape(-1, len(s))
-
-    done, number = [], 0
-    while len(pieces.local):
-        values = gap_at(places)
-        at_rule, at_between = values[:, : len(rule)], values[:, len(rule) :]
-        number += len(pieces.local)
-        allowed = UNRESOLVED_GAP * np.ptp(at_rule, axis=1)
-        allowed += OPENING_ROUND_OFF * np.abs(at_rule).max()
-        rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
-        rough &= number < MAX_PIECES
-        if not rough.any():
-            done.append(pieces)
-            break
-        done.append(rows_of(pieces, np.flatnonzero(~rough)))
-        pieces = rows_of(pieces, np.repeat(np.flatnonzero(rough), PIECE_DIVISIONS))
-        step = pieces.share / PIECE_DIVISIONS
-        start = pieces.start + step * np.tile(np.arange(PIECE_DIVISIONS), rough.sum())
-        pieces = replace(pieces, corners=np.stack([start, start + step], axis=1), share=step)
-    if len(done) == 1:
-        return done[0]
-    found = joined(done)
-    return rows_of(found, np.lexsort((found.start, found.local)))
-
-
-@lru_cache
-def _between(order: int) -> tuple[Array, Array]:
-    """Places (q + 1,) between the q Gauss points of `order` on [0, 1].
-
-    And the values there of the polynomial through values at the points, (q + 1, q).
-    """
-    rule = gauss(order)[0]
-    ends = np.concatenate([[0.0], rule, [1.0]])
-    between = (ends[1:] + ends[:-1]) / 2
-    basis = [legvander(2 * s - 1, len(rule) - 1) for s in (rule, between)]
-    return between, np.asarray(basis[1] @ np.linalg.inv(basis[0]))
 
 
 def directions(
@@ -160,15 +94,13 @@ def directions(
         d = np.full((len(s), 2), line.contact.direction)
         return d, np.zeros_like(d)
     nodal = line.on_segments(line.direction, 0.0)
-    without = line.rows < 0  # ends of Gamma_K on Gamma_u; parts that do not face
+    # At ends of Gamma_K on Gamma_u and on parts that do not face there are no rows. At an axis
+    # nodes are those of a rule with the weight r.
+    without = (line.rows < 0) | (boundary.axis[line.segments] != 0)[:, None]
     if without.any():
-        segment, at_node = boundary.at_nodes(line.segments)
+        segment, at_node = boundary.at_places(line.segments, gauss_lobatto(boundary.order))
         here = without.ravel()
         nodal[without] = boundary.exact_normal(segment[here], at_node[here])
-    # At an axis nodes are those of a rule with the weight r.
-    for k in np.flatnonzero(boundary.axis[line.segments]):
-        s_here = gauss_lobatto(boundary.order)
-        nodal[k] = boundary.exact_normal(np.full(len(s_here), line.segments[k]), s_here)
     return between_nodes(nodal[local], s)
 
 
@@ -205,12 +137,10 @@ def facing_points(
     local, facing = pieces.local[part], pieces.facing[part]
     d, turning_rate = directions(boundary, line, local, s)
     x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
-    speed = jacobian(boundary, line.contact, segment, s)
     length = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s)
-    # Where the direction is tangent to a curve d eta is 0: per arc length.
-    along = speed <= FACING_COSINE * length
-    weight, speed = weight * speed, np.where(along, length, speed)
-    stretch = np.ones((2, len(s)))
+    # Where the direction is tangent to a curve d eta is 0.
+    speed = np.maximum(jacobian(boundary, line.contact, segment, s), FACING_COSINE * length)
+    weight, stretch = weight * speed, np.ones((2, len(s)))
     stretch[0] = length / speed
     if line.contact.primary is None:
         s_there, distance = np.zeros(len(s)), np.zeros(len(s))
@@ -220,13 +150,11 @@ def facing_points(
         distance[np.abs(distance) <= GAP_ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
         there = boundary.derivative(facing, s_there)
-        turning, size = (there * across(d)).sum(axis=1), np.linalg.norm(there, axis=1)
-        along |= np.abs(turning) <= FACING_COSINE * size
-        turning = np.where(along, size, turning)
+        turning, size = np.abs((there * across(d)).sum(axis=1)), np.linalg.norm(there, axis=1)
+        turning = np.maximum(turning, FACING_COSINE * size)
         rate = (slope * across(d)).sum(axis=1) - distance * (d * across(turning_rate)).sum(axis=1)
         length = size * boundary.measure(facing, s_there)
-        stretch[1] = np.abs(rate / turning) * length / speed
-    weight[along], stretch[:, along] = 0.0, 1.0
+        stretch[1] = np.abs(rate) / turning * length / speed
     if line.contact.gap is not None:
         distance = prescribed_gap(line.contact, boundary, segment, s, x)
     own, other = BoundaryPoints(segment, s, weight), BoundaryPoints(facing, s_there, weight)
@@ -278,8 +206,8 @@ def closing_energy(
 
 def on_contact(
     solution: ScaledSolution, pair: ContactState, pairs: Sequence[ContactState]
-) -> BoundaryTerms:
-    """Residuals on both sides of one pair of all `pairs`."""
+) -> tuple[BoundaryTerms, Parts]:
+    """Terms on both sides of one pair of all `pairs`, and the parts of the boundary they cover."""
     boundary, line = solution.boundary, pair.line
     nodal, active = at_nodes(boundary, pair, pairs)
     known = np.isfinite(nodal)
@@ -290,9 +218,9 @@ def on_contact(
     held = closed[pieces.local]
     covered = covered_parts(boundary, line, rows_of(pieces, held), int(held[:whole].sum()))
     if len(pieces.local) == 0:
-        return BoundaryTerms([], [], covered)
+        return [], covered
     order = 2 * solution.order + DATA_BONUS
-    points = facing_points(boundary, line, followed_gap(boundary, line, pieces, order), order)
+    points = facing_points(boundary, line, pieces, order)
     nodal = _pressure_on_segments(nodal, boundary.places(line.segments))
     pressure = (boundary.shapes(*points.own[:2]) * nodal[points.local]).sum(axis=1) / solution.unit
     full = np.asarray(active.all(axis=1))[points.local]
@@ -300,20 +228,19 @@ def on_contact(
     sides = [_side(solution, points, pressure, meets, own=True)]
     if line.contact.primary is not None:
         sides.append(_side(solution, points, -pressure, meets, own=False))
-    residuals, every = [], np.arange(len(pressure))
-    for x in sides:  # (3.11), (3.11'): no friction
-        share = PressureShare(every, x.points.segment, x.points.s, x.across[..., 1])
-        terms = BoundaryResidual("tangential", x.element, x.weight, x.across[..., 0], [share])
-        residuals.append(terms)
-    residuals += _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
     # An overlap of two bodies costs the energy of the softer one.
     stiffness = np.min([side.stiffness for side in sides], axis=0)
     closed, depth = _gap_squares(solution, line, points, pressure, full, stiffness)
-    squares, weight = [], points.own.weight / len(sides)
-    for side in sides:
-        squares.append(Squares("complementarity", side.element, weight * closed))
-        squares.append(Squares("penetration", side.element, weight * depth))
-    return BoundaryTerms(residuals, squares, covered)
+    terms: BoundaryTerms = _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
+    every, weight = np.arange(len(pressure)), points.own.weight / len(sides)
+    for x in sides:  # (3.11), (3.11'): no friction
+        share = PressureShare(every, x.points.segment, x.points.s, x.across[..., 1])
+        terms += [
+            BoundaryResidual("tangential", x.element, x.weight, x.across[..., 0], [share]),
+            Squares("complementarity", x.element, weight * closed),
+            Squares("penetration", x.element, weight * depth),
+        ]
+    return terms, covered
 
 
 def at_nodes(
@@ -332,19 +259,15 @@ def at_nodes(
     for other in pairs if (line.rows < 0).any() else ():
         if other is pair:
             continue
-        theirs = np.zeros(boundary.space.ndof, dtype=bool)
-        theirs[other.line.node] = True
-        at = np.flatnonzero(np.isnan(pressure).ravel() & theirs[nodes])
-        if at.size == 0:
-            continue
-        d = boundary.exact_normal(segment[at], s[at])
-        if line.contact.direction is not None:
-            d[:] = line.contact.direction
+        missing = np.isnan(pressure).ravel()
+        at = np.flatnonzero(missing & np.isin(nodes, other.line.node))
+        d = rays(boundary, line.contact, segment[at], s[at])
         # At a corner the point whose direction is the nearer one.
         alike = np.where(nodes[at, None] == other.line.node, d @ other.line.direction.T, -1.0)
-        best, same = alike.argmax(axis=1), alike.max(axis=1) > SAME_DIRECTION_COSINE
-        pressure.ravel()[at[same]] = other.pressure[best[same]]
-        active.ravel()[at[same]] = other.active[best[same]]
+        same = alike.max(axis=1, initial=-1.0) > SAME_DIRECTION_COSINE
+        best = alike[same].argmax(axis=1)
+        pressure.ravel()[at[same]] = other.pressure[best]
+        active.ravel()[at[same]] = other.active[best]
     return pressure, active
 
 
@@ -358,10 +281,8 @@ def _pressure_on_segments(values: Array, places: Array) -> Array:
     values = np.where(missing, 0.0, values)
     for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
         known = ~missing[k]
-        powers = np.vander(2 * places[k] - 1, int(known.sum()))
-        values[k, missing[k]] = powers[missing[k]] @ np.linalg.solve(
-            powers[known], values[k, known]
-        )
+        through = Polynomial.fit(places[k, known], values[k, known], known.sum() - 1)
+        values[k, missing[k]] = through(places[k, missing[k]])
     return values
 
 
@@ -403,9 +324,7 @@ def _side(
     )
 
 
-def _normal(
-    sides: list[_Side], pressure: Array, full: Mask, bilateral: bool
-) -> list[BoundaryResidual]:
+def _normal(sides: list[_Side], pressure: Array, full: Mask, bilateral: bool) -> BoundaryTerms:
     """The traction along d plus the positive part of pi_h; in contact half the jump.
 
     Any pressure that is not negative may stand for pi_h, by which the estimate compares both sides:
@@ -420,7 +339,7 @@ def _normal(
     elif not bilateral:
         full = full & (pressure + (other.along[:, 0] - own.along[:, 0]) / 2 >= 0)
     at, least = np.flatnonzero(full), np.min([side.weight for side in sides], axis=0)
-    residuals = []
+    residuals: BoundaryTerms = []
     for side, faced, sign in zip(sides, sides[::-1], signs, strict=True):
         value = side.along.copy()
         value[:, 0] += sign * tension

@@ -26,7 +26,7 @@ from ..fem import moduli_of
 from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays, region_mask
 from ..quadrature import local_functions
-from .terms import BoundaryResidual, PressureShare, ScaledSolution
+from .terms import BoundaryResidual, ScaledSolution
 
 # Stiffness of supports in the last term, relative to the elements beside them.
 SUPPORT_STIFFNESS = 1e6
@@ -65,8 +65,12 @@ class PressureCorrection:
         self.edge = constant(solution.edge_weight)
         self.mu = constant(solution.mu)
         self.kappa = constant(moduli_of(solution.problem, mesh).bulk / solution.modulus)
-        (inner, f), (outer, g) = self._inside(*residuals), self._on_boundary(terms)
-        A, b, B, K = (inner + outer).tocsr(), f + g, self._divergence(), self._stiffness()
+        (A, b), B, K = self._inside(*residuals), self._divergence(), self._stiffness()
+        on_boundary = [self._on_boundary(term) for term in terms]
+        for R, term in zip(on_boundary, terms, strict=True):
+            weight = np.repeat(term.weight, term.residual.shape[1])
+            A = A + R.T @ R.multiply(weight[:, None])
+            b -= R.T @ (weight * term.residual.ravel())
         # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a
         # factorisation without pivots.
         size, inside = self.space.ndof, region_mask(self.region)[MeshArrays(mesh).bodies]
@@ -77,15 +81,10 @@ class PressureCorrection:
         self.pressure, self.motion = ng.GridFunction(self.space), ng.GridFunction(self.V)
         self.pressure.vec.FV().NumPy()[:] = found[:size]
         self.motion.vec.FV().NumPy()[:] = found[size:]
-
-    def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
-        """Add what delta contributes to a `residual` (k, c) at the boundary."""
-        on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
-        for share in shares:
-            if len(share.at):
-                boundary = self.solution.boundary
-                delta = boundary.evaluate(on_boundary, share.segment, share.s)
-                residual[share.at] += share.factor * delta
+        self.corrected = [  # residuals (k, c) of the `terms` with delta
+            term.residual + (R @ found[:size]).reshape(term.residual.shape)
+            for R, term in zip(on_boundary, terms, strict=True)
+        ]
 
     def divergence_and_jump(self) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
         """Grad delta and [delta n]: what delta adds inside the bodies, two of two components."""
@@ -116,29 +115,21 @@ class PressureCorrection:
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
-    def _on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
-        """Right side (n,) of the boundary terms."""
-        boundary, size = self.solution.boundary, self.space.ndof
+    def _on_boundary(self, term: BoundaryResidual) -> sp.csr_array:
+        """Matrix (k * c, n) from coefficients of delta to what it adds to residuals (k, c)."""
+        boundary, (k, c), size = self.solution.boundary, term.residual.shape, self.space.ndof
         numbers = np.arange(size).reshape(-1, self.functions)
         shapes = ng.BoundaryFromVolumeCF(local_functions(self.space, numbers))
-        A, b = sp.csr_array((size, size)), np.zeros(size)
-        for term in terms:
-            k, c = term.residual.shape
-            rows = sp.csr_array((k * c, size))
-            for share in term.shares:
-                if len(share.at) == 0:
-                    continue
+        rows = sp.csr_array((k * c, size))
+        for share in term.shares:
+            if len(share.at):
                 value = boundary.evaluate(shapes, share.segment, share.s)
-                first = boundary.element[share.segment] * self.functions
-                column = first[:, None, None] + np.arange(self.functions)
+                column = numbers[boundary.element[share.segment], None]
                 row = share.at[:, None, None] * c + np.arange(c)[:, None]
                 row, column = np.broadcast_arrays(row, column)
                 entries = share.factor[:, :, None] * value[:, None, :]
-                rows += from_triplets(entries.ravel(), row.ravel(), column.ravel(), (k * c, size))
-            weight = np.repeat(term.weight, c)
-            A += rows.T @ rows.multiply(weight[:, None])
-            b -= rows.T @ (weight * term.residual.ravel())
-        return A, b
+                rows += from_triplets(entries.ravel(), row.ravel(), column.ravel(), rows.shape)
+        return rows
 
     def _stiffness(self) -> sp.csr_array:
         """Form of mu |grad v|^2, with v held where displacements are prescribed."""

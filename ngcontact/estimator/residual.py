@@ -19,7 +19,7 @@ sigma_h. Squared contributions of an element T of diameter h, shear modulus mu, 
   no more than closing the gap would cost, as a penetration
 * penetration: mu / l |(-gap)_+|^2 over Gamma_K, of the softer body; l is h, or the length
   |gap| / |d_s gap| in which the gap changes where that is shorter. Gaps are measured along the
-  normals of the contact rows, and gap data followed by the quadrature
+  normals of the contact rows
 * displacement: 2 mu |w| max(|w| / h, |dw/ds|) over each segment of Gamma_u, w = u_D - u_h; mu is
   here the stiffness of a strain without change of volume, the largest. What w costs is at most
   2 mu times its square in H^(1/2), which |w| |dw/ds| bounds. Over Gamma_0 2 mu / l |u_h.n|^2 with
@@ -34,7 +34,6 @@ On an enlarging zone forces are per unit eta along xi.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -172,11 +171,11 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
 
     element = boundary.element[segment]
     weight = solution.edge_weight[element] * ds
-    residuals = []
+    terms = BoundaryTerms(squares)
     for name, at in (("traction", ~guided), ("sliding", guided)):
         share = PressureShare(np.arange(at.sum()), segment[at], s[at], factor[at])
-        residuals.append(BoundaryResidual(name, element[at], weight[at], residual[at], [share]))
-    return BoundaryTerms(residuals, squares, parts)
+        terms.append(BoundaryResidual(name, element[at], weight[at], residual[at], [share]))
+    return terms
 
 
 def _rough_tractions(
@@ -277,9 +276,10 @@ def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> E
     if solved.problem.dim == 3:
         terms, corrected_from = surface_terms(solution, pairs), math.inf
     else:
-        terms = [on_contact(solution, pair, pairs) for pair in pairs]
-        rest = remaining(boundary.inner | boundary.on_axis, [term.covered for term in terms])
-        terms.append(on_supports_and_loads(solution, rest))
+        of_pairs = [on_contact(solution, pair, pairs) for pair in pairs]
+        terms = [term for on_pair, _ in of_pairs for term in on_pair]
+        rest = remaining(boundary.inner | boundary.on_axis, [covered for _, covered in of_pairs])
+        terms += on_supports_and_loads(solution, rest)
     parts = _squares(solution, terms, corrected_from)
     total = np.sum(list(parts.values()), axis=0)
     unit = solution.unit / math.sqrt(solution.modulus)  # of the energy norm
@@ -289,7 +289,7 @@ def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> E
 
 
 def _squares(
-    solution: ScaledSolution, terms: Sequence[BoundaryTerms], corrected_from: float
+    solution: ScaledSolution, terms: BoundaryTerms, corrected_from: float
 ) -> dict[str, Array]:
     """Squared contributions (ne,) by name, after the pressure has been corrected where needed."""
     problem, mesh, order = solution.problem, solution.mesh, solution.order
@@ -301,14 +301,14 @@ def _squares(
     if problem.varying:
         parts["oscillation"] = oscillation(solution)
     force, of_loads = _body_forces(solution)
-    for squares in [x for term in terms for x in term.squares] + of_loads:
+    for squares in [x for x in terms if isinstance(x, Squares)] + of_loads:
         add(*squares)
-    residuals = [x for term in terms for x in term.residuals]
+    residuals = [x for x in terms if isinstance(x, BoundaryResidual)]
     divergence, jump = divergence_and_jump(solution.projected)
     divergence = solution.model.divergence(divergence, solution.stress, solution.normal_stress)
     if force is not None:
         divergence += force  # (3.5)
-    degree, correction = solution.projected.space.globalorder, None
+    degree, corrected = solution.projected.space.globalorder, [x.residual for x in residuals]
     names = nearly_incompressible(mesh, corrected_from, solution.incompressibility)
     if names:
         correction = PressureCorrection(solution, list(names), (divergence, jump), residuals)
@@ -316,17 +316,14 @@ def _squares(
         of_pressure = correction.divergence_and_jump()
         divergence += of_pressure[0]
         jump += of_pressure[1]
-        degree = order
+        corrected, degree = correction.corrected, order
     data = DATA_BONUS if problem.force else 0
     if degree or data:  # else there is no divergence
         followed = 2 * (max(order, 2) + 1) if of_loads else 0  # of polynomials for rough forces
         inside = element_integral(solution, divergence, max(2 * degree + data, followed))
         parts["element"] += solution.element_weight * inside
     parts["jump"] = solution.edge_weight / 2 * edge_integral(solution, jump, 2 * degree)
-    for term in residuals:
-        residual = term.residual.copy()
-        if correction is not None:
-            correction.add_to(residual, term.shares)
+    for term, residual in zip(residuals, corrected, strict=True):
         add(term.name, term.element, term.weight * (residual**2).sum(axis=1))
     return parts
 
@@ -393,6 +390,10 @@ class Estimated(Solved):
 
         With initial strains over the norm of the stress, of e(u_h) - e0.
         """
-        if self.error_estimate == 0 or (self.problem.strain and self.stress_free):
+        return self._relative(self.error_estimate)
+
+    def _relative(self, error: float) -> float:
+        """An `error` over the norm of the solution."""
+        if error == 0 or (self.problem.strain and self.stress_free):
             return 0.0
-        return self.error_estimate / self.energy_norm if self.energy_norm > 0 else float("inf")
+        return error / self.energy_norm if self.energy_norm > 0 else math.inf

@@ -16,15 +16,15 @@ from ..contact import (
     ContactState,
     facing_pieces,
     interpolated_rays,
+    jacobian,
     opposite,
     prescribed_gap,
 )
-from ..fem import BoundaryTrace, FacetTrace
+from ..fem import BoundaryTrace
 from ..reference import triangle
-from .terms import BoundaryPoints, BoundaryResidual, BoundaryTerms, Parts, ScaledSolution, Squares
+from .terms import BoundaryPoints, BoundaryResidual, BoundaryTerms, ScaledSolution, Squares
 
 DATA_DEGREE = 4  # of quadrature above the discrete terms, for the data
-NO_PARTS = Parts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))  # of lines
 
 
 def _points(trace: BoundaryTrace, facets: Index, degree: int) -> BoundaryPoints:
@@ -35,13 +35,14 @@ def _points(trace: BoundaryTrace, facets: Index, degree: int) -> BoundaryPoints:
     return BoundaryPoints(every, places, weight)
 
 
-def surface_terms(solution: ScaledSolution, pairs: Sequence[ContactState]) -> list[BoundaryTerms]:
+def surface_terms(solution: ScaledSolution, pairs: Sequence[ContactState]) -> BoundaryTerms:
     """Terms of the whole boundary: of each pair, and of what no pair covers."""
-    zones, uncovered = [on_zone(solution, pair) for pair in pairs], ~solution.boundary.inner
-    for _, covered in zones:
+    terms, uncovered = BoundaryTerms(), ~solution.boundary.inner
+    for pair in pairs:
+        on_pair, covered = on_zone(solution, pair)
+        terms += on_pair
         uncovered[covered] = False
-    rest = on_supports_and_loads(solution, np.flatnonzero(uncovered))
-    return [*(term for term, _ in zones), rest]
+    return terms + on_supports_and_loads(solution, np.flatnonzero(uncovered))
 
 
 def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTerms:
@@ -70,14 +71,13 @@ def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTe
     weight = solution.edge_weight[element] * points.weight
     squares = 2 * solution.mu[element] / solution.diameter[element] * points.weight
     squares = squares * ((miss / solution.strain) ** 2).sum(axis=1)  # (3.6)
-    return BoundaryTerms(
-        residuals=[BoundaryResidual("boundary", element, weight, t, [])],
-        squares=[Squares("displacement", element, squares)],
-        covered=NO_PARTS,
-    )
+    return [
+        BoundaryResidual("boundary", element, weight, t, []),
+        Squares("displacement", element, squares),
+    ]
 
 
-def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Array) -> Array:
+def discrete_pressure(trace: BoundaryTrace, pair: ContactState, local: Index, s: Array) -> Array:
     """The pressure (k,) that the forces stand for, at `s` (k, 3) of facets `local` (k,) of a zone.
 
     At order 2 linear through the middles of edges, with Bernstein's polynomials where vertices have
@@ -99,81 +99,57 @@ def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Ar
 
 
 def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:
-    """Terms of one pair, and the facets (j,) that it covers.
+    """Terms of one pair, and the facets (j,) of both bodies that face each other.
 
     Where all rows of a facet are active both bodies have one pressure, and half the jump of their
     tractions counts; elsewhere the difference from the discrete forces. Gaps count where they are
     negative, and where they are open under pressure.
     """
     trace, zone = solution.boundary, pair.line
-    if not isinstance(trace, FacetTrace):
-        raise TypeError("a pair of solids is asked for")
-    degree = 2 * solution.order
     parts, _ = facing_pieces(trace, zone, np.asarray((zone.rows >= 0).any(axis=1)))
-    covered = parts.covered(len(zone.segments))
-    alone = np.flatnonzero(covered == 0)
-    met = np.isin(zone.facing, parts.facing)
-    residuals: list[BoundaryResidual] = []
-    squares: list[Squares] = []
-    s, w = triangle.gauss(degree)
-    each = rows_of(parts, np.arange(len(parts.local)).repeat(len(s)))
+    places, w = triangle.gauss(2 * solution.order)
+    each = rows_of(parts, np.arange(len(parts.local)).repeat(len(places)))
     local, facing = each.local, each.facing
-    facet, places = zone.segments[local], parts.places(s)
-    weight = trace.surface_element(facet, places) * (parts.share[:, None] * w).ravel()
-    own = BoundaryPoints(facet, places, weight)
-    d = interpolated_rays(trace, zone.contact, zone.segments, local, own.s)
-    n = trace.normal(own.segment, own.s)
-    cosine = (n * d).sum(axis=1)
-    weight = own.weight * np.abs(cosine)  # across the direction
-    pi = discrete_pressure(trace, pair, local, own.s) / solution.unit
-    if zone.contact.direction is None:
-        weight, cosine = own.weight, np.ones(len(cosine))
+    facet, s = zone.segments[local], parts.places(places)
+    size, seen = trace.surface_element(facet, s), jacobian(trace, zone.contact, facet, s)
+    weight = seen * (parts.share[:, None] * w).ravel()  # across a fixed direction
+    d = interpolated_rays(trace, zone.contact, zone.segments, local, s)
+    pi = discrete_pressure(trace, pair, local, s) / solution.unit
     active, has = zone.on_segments(pair.active, False), zone.rows >= 0
     full = np.asarray((active | ~has).all(axis=1) & has.any(axis=1))[local]
-    element = trace.element[own.segment]
-    u = trace.evaluate(solution.displacement, own.segment, own.s)
-    t = solution.traction(own.segment, own.s) / np.abs(cosine)[:, None]
-    sides = [(element, t, 1.0)]
-    distance = np.zeros(len(pi))
+    u = trace.evaluate(solution.displacement, facet, s)
+    sides = [(trace.element[facet], solution.traction(facet, s) * (size / seen)[:, None], 1.0)]
+    x, distance, shared = trace.point(facet, s), np.zeros(len(pi)), np.zeros_like(full)
     if zone.contact.primary is not None:
-        x = trace.point(own.segment, own.s)
         there, distance = opposite(trace, x, d, facing, each.opposite)
-        weight = weight * np.isfinite(distance)
-        distance = np.where(np.isfinite(distance), distance, 0.0)
+        met = np.isfinite(distance)
+        weight, distance = weight * met, np.where(met, distance, 0.0)
         across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
         u = u - trace.evaluate(solution.displacement, facing, there)
         other = solution.traction(facing, there) / across[:, None]
         sides.append((trace.element[facing], other, -1.0))
+        shared = full
     if zone.contact.gap is not None:
-        distance = prescribed_gap(
-            zone.contact, trace, own.segment, own.s, trace.point(own.segment, own.s)
-        )
+        distance = prescribed_gap(zone.contact, trace, facet, s, x)
     gap = (distance - (u * d).sum(axis=1)) / solution.strain
-    along = [sign * (t * d).sum(axis=1) + pi for _, t, sign in sides]
     half_jump = sum((t * d).sum(axis=1) for _, t, _ in sides) / 2
     least = np.min([solution.edge_weight[e] for e, _, _ in sides], axis=0)
     stiff = np.min([solution.mu[e] / solution.diameter[e] for e, _, _ in sides], axis=0)
-    both = np.where(full & (len(sides) == 2), np.abs(half_jump), np.inf)
-    for (e, t, _), miss in zip(sides, along, strict=True):
-        own_weight = solution.edge_weight[e]
-        shared = np.isfinite(both)
-        values = np.where(shared, both, miss)[:, None]
+    closing, product = stiff * gap**2, np.maximum(pi, 0.0) * np.maximum(gap, 0.0) / 2
+    product, depth = np.where(full, np.minimum(product, closing), product), closing * (gap < 0)
+    if zone.contact.bilateral:
+        depth, product = closing, np.zeros(len(gap))
+    terms, share = BoundaryTerms(), weight / len(sides)
+    for e, t, sign in sides:
+        own_weight, along = solution.edge_weight[e], (t * d).sum(axis=1)
+        values = np.where(shared, half_jump, sign * along + pi)[:, None]
         factor = np.where(shared, least, own_weight) * weight
-        residuals.append(BoundaryResidual("pressure", e, factor, values, []))
-        shear = t - (t * d).sum(axis=1)[:, None] * d
-        residuals.append(BoundaryResidual("tangential", e, own_weight * weight, shear, []))
-        depth = stiff * np.minimum(gap, 0.0) ** 2
-        product = np.maximum(pi, 0.0) * np.maximum(gap, 0.0) / 2
-        product = np.where(full, np.minimum(product, stiff * gap**2), product)
-        if zone.contact.bilateral:
-            depth, product = stiff * gap**2, np.zeros(len(gap))
-        share = weight / len(sides)
-        squares.append(Squares("penetration", e, depth * share))
-        squares.append(Squares("complementarity", e, product * share))
-    rest = np.concatenate([zone.segments[alone], zone.facing[~met]])
-    points = _points(trace, rest, degree)
-    free, element = solution.traction(points.segment, points.s), trace.element[points.segment]
-    weight = solution.edge_weight[element] * points.weight
-    residuals.append(BoundaryResidual("boundary", element, weight, free, []))
-    both_sides = np.concatenate([zone.segments, zone.facing])
-    return BoundaryTerms(residuals, squares, NO_PARTS), both_sides
+        shear = t - along[:, None] * d
+        terms += [
+            BoundaryResidual("pressure", e, factor, values, []),
+            BoundaryResidual("tangential", e, own_weight * weight, shear, []),
+            Squares("penetration", e, depth * share),
+            Squares("complementarity", e, product * share),
+        ]
+    covered = np.concatenate([zone.segments[parts.local], parts.facing[parts.facing >= 0]])
+    return terms, covered

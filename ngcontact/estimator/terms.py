@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -14,6 +14,7 @@ from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of, summing
 from ..lagrange import gauss
 from ..problem import Problem
 
+VOIGT = {3: ((0, 2), (2, 1)), 6: ((0, 5, 4), (5, 1, 3), (4, 3, 2))}  # numbers, by components
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
 
 
@@ -69,12 +70,7 @@ class Squares(NamedTuple):
     values: Array  # (k,), with their weights
 
 
-class BoundaryTerms(NamedTuple):
-    """Contributions of the `covered` parts of the boundary."""
-
-    residuals: list[BoundaryResidual]
-    squares: list[Squares]
-    covered: Parts
+BoundaryTerms: TypeAlias = list[BoundaryResidual | Squares]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,11 +162,8 @@ def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
 
 def tensor(voigt: ng.CoefficientFunction) -> ng.CoefficientFunction:
     """The stress (2, 2), of a solid (3, 3), of components in Voigt's order."""
-    if voigt.dim == 6:
-        xx, yy, zz, yz, xz, xy = voigt
-        return ng.CF((xx, xy, xz, xy, yy, yz, xz, yz, zz), dims=(3, 3))
-    xx, yy, xy = voigt
-    return ng.CF((xx, xy, xy, yy), dims=(2, 2))
+    rows = VOIGT[voigt.dim]
+    return ng.CF(tuple([voigt[k] for row in rows for k in row]), dims=(len(rows), len(rows)))
 
 
 def oscillation(solution: ScaledSolution) -> Array:
@@ -189,9 +182,8 @@ def divergence_and_jump(
     stress: ng.GridFunction,
 ) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
     """Div sigma and [sigma n] of a projected stress, two of d components."""
-    d = 2 if stress.dim == 3 else 3
-    plane, solid = ((0, 5), (4, 3)), ((0, 16, 14), (15, 4, 11), (12, 10, 8))
-    rows: tuple[tuple[int, ...], ...] = plane if d == 2 else solid
+    voigt = VOIGT[stress.dim]
+    d, rows = len(voigt), [tuple([len(row) * k + j for j, k in enumerate(row)]) for row in voigt]
     divergence = summing(stress.dim * d, *rows) * ng.Grad(stress).Reshape((stress.dim * d,))
     return divergence, tensor(stress - stress.Other()) * ng.specialcf.normal(d)
 

@@ -45,6 +45,21 @@ def pressed(mesh, secondary="upper", direction=True, rows="auto", laws=LAWS, tur
     )
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_estimate_of_a_beam_on_two_blocks(order):
+    """One side is the secondary of two pairs: what faces one block is not free beside the other."""
+    lower = [(name, (x, 0, -1), (x + 1, 1, 0), (2, 2, 2)) for x, name in enumerate("bc")]
+    problem = Problem(
+        geometry=boxes(("a", (0, 0, 0), (2, 1, 1), (4, 2, 2)), *lower),
+        materials={"a|b|c": Elastic(1.0, 0.0)},
+        displacement={"b_bottom|c_bottom": (0, 0, 0)},
+        sliding="a_left|a_front",
+        traction={"a_top": 0.01},
+        contact=[Contact("a_bottom", f"{x}_top", direction=(0, 0, -1)) for x in "bc"],
+    )
+    assert solve(problem, order=order).relative_error_estimate < 1e-12  # measured 2e-14
+
+
 def stresses(mesh, stress):
     """Values (k, 3, 3) at points inside all elements."""
     points = mesh.MapToAllElements(ng.IntegrationRule(ng.TET, 2), ng.VOL)

@@ -26,11 +26,10 @@ from ...quadrature import SampledElements, features_of, loads_of, unresolved, wh
 from .cells import Cells, bisected, cells_of, dependent, parted
 from .elements import Element, by_triangle, elements_of, rigid_motions
 from .facing import (
-    TO_ENDS,
     PressureSupport,
     facing_middles,
     facing_sides,
-    guide_sides,
+    guides,
     held_motions,
     new_vertices,
     pressure_support,
@@ -174,14 +173,14 @@ def _bound(
     With `beside`, p* also has breaks there beside ends of segments, and cells are bisected where
     forces are rough.
     """
-    guided = trace.segments(problem.guide)
-    guided = guided[~trace.on_axis[guided]]  # the axis guides by itself: there u_r = 0
     touching = [name for pair in problem.contact for name in pair.sides]
-    loaded = np.append(trace.segments(*problem.traction, *touching), guided)
+    loaded = trace.segments(*problem.traction, *touching, problem.guide)
+    loaded = loaded[~trace.on_axis[loaded]]
     fixed = [name for name, values in problem.displacement.items() if None not in values]
     degree = trace.order + LIFTING_DEGREES
     reaches = [pressure_support(trace, displacement, pair, degree) for pair in pairs]
     both = zip(rough_places(problem, trace), new_vertices(trace, reaches, beside), strict=True)
+    reaches += [pressure_support(trace, displacement, x, degree) for x in guides(problem, trace)]
     segment, s = (np.concatenate(parts) for parts in both)
     supported = trace.segments(*fixed)
     cells, largest_size = cells_of(trace, (segment, s)), force_features(problem, trace)
@@ -196,14 +195,14 @@ def _bound(
     while (large := cells.diameters > largest_size[cells.parent]).any():
         cells, _ = bisected(cells, large, linked)
     parts, whole = parted(cells, dependent(cells, loaded, supported))
-    found = _proof(problem, parts, displacement, reaches, guided)
+    found = _proof(problem, parts, displacement, reaches)
     if found.parts["loads"] <= NEGLIGIBLE_LOADS * found.parts["constitutive"]:
         return found
     c, D = (np.sqrt(np.bincount(whole, x**2)) for x in (found.stress.distance, found.stress.loads))
     cells = divided(problem, cells, (parts, found.dual.elements), (c, D), linked)
     parts, _ = parted(cells, dependent(cells, loaded, supported))
     try:
-        other = _proof(problem, parts, displacement, reaches, guided, [found.dual])
+        other = _proof(problem, parts, displacement, reaches, [found.dual])
     except ContactError as error:
         warn(
             f"the guaranteed bound is wide: {found.parts['loads'] / found.bound**2:.0%} of its "
@@ -230,13 +229,9 @@ def _proof(
     cells: Cells,
     displacement: ng.GridFunction,
     reaches: Sequence[PressureSupport],
-    guided: Index,
     known: Sequence[DualProblem] = (),
 ) -> Proof:
-    """The bound on given cells; segments `guided` (k,) are those of Gamma_0.
-
-    Triangles that other problems have too are `known`.
-    """
+    """The bound on given cells; triangles that other problems have too are `known`."""
     trace = cells.trace
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
@@ -248,13 +243,10 @@ def _proof(
     mu, elements = elements_of(problem, cells, displacement, degree, before)
     # 3. The gap, on guides and on Gamma_K.
     prescribed = prescribed_on_supports(problem, cells, displacement)
-    side, degrees = cells.sides_on(guided), (degree - extent, lift)
-    lines = [guide_sides(cells, displacement, side, degrees)] if side.size else []
     holding = [(x.side, x.direction[:, [0, -1]]) for x in prescribed]
-    held = held_motions(cells, holding + [(x.side, TO_ENDS @ x.direction) for x in lines])
-    moduli = by_triangle(elements, [e.modulus for e in elements])
-    for reach in reaches:
-        lines.append(facing_sides(cells, displacement, reach, degrees, held, moduli))
+    held = held_motions(cells, holding, reaches)
+    moduli, degrees = by_triangle(elements, [e.modulus for e in elements]), (degree - extent, lift)
+    lines = [facing_sides(cells, displacement, x, degrees, held, moduli) for x in reaches]
     every = np.arange(len(trace.region))
     sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
     size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.gap for x in lines])

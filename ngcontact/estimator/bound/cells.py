@@ -19,7 +19,7 @@ from ...arrays import Array, Index, Mask
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
-from ...problem import MeshArrays
+from ...quadrature import SampledElements
 from .polynomials import coordinates
 
 NEWTON_STEPS = 8
@@ -64,7 +64,7 @@ class Cells:
     @cached_property
     def diameters(self) -> Array:
         """Longest straight side (n,), lengths."""
-        return _lengths(self.corners).max(axis=1)
+        return np.asarray(self.lengths[self.sides].max(axis=1))
 
     @cached_property
     def backward(self) -> Mask:
@@ -87,11 +87,11 @@ class Cells:
     @property
     def bodies(self) -> Index:
         """Numbers (n,) of the material regions."""
-        return MeshArrays(self.trace.mesh).bodies[self.parent]
+        return self.trace.arrays.bodies[self.parent]
 
-    @property
+    @cached_property
     def lengths(self) -> Array:
-        """Lengths (k,) of the chords of sides."""
+        """Lengths (e,) of the chords of sides."""
         return np.linalg.norm(np.diff(self.vertices[self.ends], axis=1)[:, 0], axis=1)
 
     def sides_on(self, segments: Index) -> Index:
@@ -153,16 +153,10 @@ class Cells:
         """The model's measure (...,) at points `x` (..., 2)."""
         return np.asarray(self.trace.model.measure(x.reshape(-1, 2))).reshape(x.shape[:-1])
 
-    def evaluate(self, function: ng.CoefficientFunction, at: Index, reference: Array) -> Array:
-        """Values (k, dim) in triangles `at` (k,) at places `reference` (k, 2) of their parents."""
-        points = self._middles[self.parent[at]]
-        points["x"], points["y"] = reference.T
-        return np.asarray(function(points)).reshape(len(at), function.dim)
-
     @cached_property
-    def _middles(self) -> np.ndarray:
-        rule = ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1.0])
-        return np.asarray(self.trace.mesh.MapToAllElements(rule, ng.VOL))
+    def elements(self) -> SampledElements:
+        """The elements of the mesh, the `parent` of each triangle, where functions have values."""
+        return SampledElements(self.trace.mesh, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,26 +184,23 @@ class Places:
     @cached_property
     def reference(self) -> Array:
         """Reference coordinates (b, q, 2) in the parents."""
-        cells, at = self.cells, self.at
+        cells, parent = self.cells, self.cells.parent[self.at]
         shares = np.column_stack([self.local[:, 1], 1 - self.local.sum(axis=1), self.local[:, 0]])
-        found = shares @ cells.barycentric[at, :, :2]
-        bent = np.flatnonzero(cells.trace.curved_elements[cells.parent[at]])
-        owner, flat = np.repeat(at[bent], len(shares)), found[bent].reshape(-1, 2)
+        found = shares @ cells.barycentric[self.at, :, :2]
+        bent = np.flatnonzero(cells.trace.curved_elements[parent])
         for _ in range(NEWTON_STEPS if bent.size else 0):
-            slope = cells.evaluate(ng.specialcf.JacobianMatrix(2), owner, flat).reshape(-1, 2, 2)
-            miss = self.x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)
-            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
-            flat += step
+            at = parent[bent], found[bent]
+            slope = cells.elements.evaluate(ng.specialcf.JacobianMatrix(2), *at)
+            miss = self.x[bent] - cells.elements.evaluate(ng.CF((ng.x, ng.y)), *at)
+            step = np.linalg.solve(slope.reshape(*miss.shape, 2), miss[..., None])[..., 0]
+            found[bent] += step
             if np.abs(step).max() <= NEWTON_STEP:
                 break
-        found[bent] = flat.reshape(-1, *found.shape[1:])
         return found
 
     def evaluate(self, function: ng.CoefficientFunction) -> Array:
         """Values (b, q, dim) of a function at the points."""
-        b, q = self.weight.shape
-        flat = self.reference.reshape(-1, 2)
-        return self.cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
+        return self.cells.elements.evaluate(function, self.cells.parent[self.at], self.reference)
 
 
 def places(cells: Cells, at: Index, order: int) -> Places:
@@ -255,9 +246,9 @@ def cells_of(trace: BoundaryTrace, cuts: tuple[Index, Array]) -> Cells:
     cuts : ndarray of int (r,), ndarray (r,)
         Segments of the boundary with parameters s of new vertices, rising on each.
     """
-    view, unit = MeshArrays(trace.mesh), np.eye(3)
-    old, ne = view.elements, trace.mesh.ne
-    cells = joined(trace, view.vertices, old, np.broadcast_to(unit, (ne, 3, 3)), np.arange(ne))
+    view, ne = trace.arrays, trace.mesh.ne
+    whole = np.broadcast_to(np.eye(3), (ne, 3, 3))
+    cells = joined(trace, view.vertices, view.elements, whole, np.arange(ne))
     segment, s = cuts
     cut = np.isin(cells.segment, segment)
     several = (cells.bent | cut)[cells.sides].sum(axis=1) > 1
@@ -281,7 +272,7 @@ def joined(
     `parent` (n,) and `barycentric` (n, 3, 3) are those of `Cells`, in the order of the triangles.
     Sides on one side of a parent lie on its segment of the boundary.
     """
-    view = MeshArrays(trace.mesh)
+    view = trace.arrays
     at = view.elements[trace.element][:, :, None] == view.facets[:, None]  # (k, corners, ends)
     last, outer = at[..., 1].argmax(axis=1), np.flatnonzero(~trace.inner)
     segments = np.full(view.elements.shape, -1)  # opposite to each corner of the elements
@@ -290,8 +281,9 @@ def joined(
     on = np.roll(zero, -1, axis=1) & np.roll(zero, -2, axis=1)  # (n, 3 sides, 3 of the parent)
     own = np.where(on, segments[parent][:, None], -1).max(axis=2)
     bent = np.append(trace.curved_segments, False)
-    base = _lengths(vertices[triangles]).argmin(axis=1)
-    base = np.where(bent[own].any(axis=1), bent[own].argmax(axis=1), base)
+    x = vertices[triangles]
+    length = np.linalg.norm(np.roll(x, -2, axis=1) - np.roll(x, -1, axis=1), axis=2)
+    base = np.where(bent[own], -1.0, length).argmin(axis=1)
     roll = (base[:, None] + np.arange(3)) % 3
     triangles, own = (np.take_along_axis(x, roll, axis=1) for x in (triangles, own))
     barycentric = np.take_along_axis(barycentric, roll[..., None], axis=1)
@@ -318,11 +310,6 @@ def joined(
         curved=bent[own[:, 0]],
         bent=bent[segment],
     )
-
-
-def _lengths(corners: Array) -> Array:
-    """Lengths (n, 3) of the straight sides opposite to `corners` (n, 3, 2)."""
-    return np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
 
 
 def _with_parts(
@@ -378,8 +365,7 @@ def bisected(
     side, other, there = linked(cells)
     one, t = np.arange(len(cells.ends)), np.full(len(cells.ends), 0.5)
     one[other], t[other] = side, there
-    length = cells.lengths
-    length[cells.bent] *= CURVED_LENGTH
+    length = cells.lengths * np.where(cells.bent, CURVED_LENGTH, 1.0)
     rank, of = np.argsort(np.argsort(length, kind="stable")), one[cells.sides]  # no two are alike
     longest = of[np.arange(len(of)), rank[of].argmax(axis=1)]
     wanted, count = np.isin(one, longest[marked]), 0
@@ -397,7 +383,7 @@ def parted(cells: Cells, at: Index) -> tuple[Cells, Index]:
     centre of gravity, which is farther from the longest side. Also returned are the cells (m,) that
     each is or is part of.
     """
-    share = np.where(cells.curved[at, None], 1.0, _lengths(cells.corners[at]))
+    share = np.where(cells.curved[at, None], 1.0, cells.lengths[cells.sides[at]])
     share /= share.sum(axis=1, keepdims=True)
     new, number = (share[:, None] @ cells.corners[at])[:, 0], np.repeat(np.arange(len(at)), 3)
     order, moved = np.tile([0, 1, 2], (len(number), 1)), np.tile([0, 1, 2], len(at))

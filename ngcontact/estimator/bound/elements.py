@@ -314,8 +314,8 @@ class BodyData:
         if self.law_varies[cells.bodies[points.at]].any():
             C = points.evaluate(self.stiffness)
         else:
-            middle = np.full((len(points.at), 2), 1 / 3)
-            C = cells.evaluate(self.stiffness, points.at, middle)[:, None]
+            middle = np.full((1, 2), 1 / 3)
+            C = cells.elements.evaluate(self.stiffness, cells.parent[points.at], middle)
         v = round(C.shape[-1] ** 0.5)
         return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 

@@ -17,7 +17,9 @@ from ...contact import (
     FACING_COSINE,
     ContactState,
     divided,
+    facing_pieces,
     jacobian,
+    nodal_line,
     partners,
     prescribed_gap,
     rays,
@@ -25,6 +27,7 @@ from ...contact import (
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss, lagrange
+from ...problem import Contact, Problem
 from .cells import Cells
 
 GAP_NOISE = 1e-14  # of a gap, relative to the displacements on both sides
@@ -115,6 +118,14 @@ def opposite_points(
     return OppositePoints(gap.reshape(s.shape), d.reshape(u.shape), *at, faces.reshape(s.shape))
 
 
+def guides(problem: Problem, trace: BoundaryTrace) -> list[ContactState]:
+    """Gamma_0 as bilateral contact with an obstacle without a gap; the axis guides by itself."""
+    if trace.on_axis[trace.segments(problem.guide)].all():
+        return []
+    line, _ = nodal_line(trace, Contact(str(problem.guide), gap=0.0, bilateral=True))  # (3.8)
+    return [ContactState(line, line.gap, 0 * line.gap, np.ones(len(line.gap), dtype=bool))]
+
+
 class PressureSupport(NamedTuple):
     """Parts of the boundary on which p* of a pair may act."""
 
@@ -132,26 +143,21 @@ def pressure_support(
     They do on each part between vertices of both bodies. Segments that face in part, as beside the
     end of a body, are examined in points.
     """
-    line, found = pair.line, np.zeros((0, 3))
+    line, found = pair.line, list[tuple[float, float, float]]()
     if line.contact.bilateral or not len(line.segments):
-        return PressureSupport(pair, line.segments, found)
+        segments = line.segments[~trace.on_axis[line.segments]]
+        return PressureSupport(pair, segments, np.zeros((0, 3)))
     nodes, active = trace.nodes[line.segments][:, [0, -1]], line.on_segments(pair.active, False)
     near = np.asarray(np.isin(nodes, nodes[active.any(axis=1)]).any(axis=1))
-    if len(rest := np.flatnonzero(~near)):
-        local, span = np.arange(len(rest)), np.tile([0.0, 1.0], (len(rest), 1))
-        smooth = np.full(len(rest), line.contact.primary is None)  # opposite vertices make kinks
-        if line.contact.primary is not None:
-            parts = divided(trace, line.contact, line.segments[rest], line.facing)
-            local = np.append(local, parts.local)
-            span = np.vstack([span, np.column_stack([parts.start, parts.stop])])
-            smooth = np.append(smooth, parts.local >= 0)
-        s = span[:, :1] + np.diff(span, axis=1) * POINTS
-        there = opposite_points(trace, displacement, pair, line.segments[rest[local]], s)
+    parts, _ = facing_pieces(trace, line, ~near)  # opposite vertices make kinks
+    if len(parts.local):
+        s = parts.start[:, None] + parts.share[:, None] * POINTS
+        there = opposite_points(trace, displacement, pair, line.segments[parts.local], s)
         overlap = np.asarray(((there.gap < 0) & there.faces).any(axis=1))
-        smooth &= there.faces.all(axis=1)
+        smooth = there.faces.all(axis=1)
         c, off = fitted(there.gap[smooth], degree)
         overlap[smooth] = c.min(axis=1, initial=np.inf) < off
-        near[rest[local[overlap]]] = True
+        near[parts.local[overlap]] = True
     places, turns = trace.places(line.segments), np.diff(active.astype(int), axis=1)
     for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
         ends = [0.0] if active[i, 0] else []
@@ -161,9 +167,9 @@ def pressure_support(
             gap = opposite_points(trace, displacement, pair, line.segments[[i]], s[None]).gap[0]
             last = np.append(s[0], s[gap < 0])[-1]
             ends.append(last + CONTACT_MARGIN * np.sign(s[-1] - s[0]))
-        both = np.array([*ends, 1.0] if active[i, -1] else ends).reshape(-1, 2)
-        found = np.append(found, np.insert(both, 0, line.segments[i], axis=1), axis=0)
-    return PressureSupport(pair, line.segments[near], found)
+        ends += [1.0] if active[i, -1] else []
+        found += [(line.segments[i], *both) for both in zip(ends[::2], ends[1::2], strict=True)]
+    return PressureSupport(pair, line.segments[near], np.reshape(found, (-1, 3)))
 
 
 def new_vertices(
@@ -225,8 +231,6 @@ def _opposite(
         if not (np.abs(step) > INSIDE_SIDE).any():
             break
         s[near] = (s[near] + step).clip(0, 1)
-    exact = near[np.abs(t[near] - vertex) <= SAME_VERTEX]
-    t[exact] = np.round(t[exact])
     return s, (there, t)
 
 
@@ -253,7 +257,7 @@ class FacingSides:
     Functions are given at the j Gauss points of `POINTS` on each side, t of the secondary's.
     """
 
-    pair: ContactState | None  # None for a guide
+    pair: ContactState
     side: Index  # (k,) of the secondary
     other: Index  # (k,) of the primary, -1 without one
     there: Array  # (k, j) parameters on the primary's sides
@@ -271,7 +275,7 @@ class FacingSides:
     @property
     def equality(self) -> bool:
         """Whether the gap is 0 and forces have any sign."""
-        return self.pair is None or self.pair.line.contact.bilateral
+        return self.pair.line.contact.bilateral
 
     @property
     def bound(self) -> Array:
@@ -364,6 +368,7 @@ def facing_sides(
     )
     closed = np.isin(segment, line.segments[whole]) | inside.any(axis=1) | contact.bilateral
     # Shares are as compliances: all where only one body can move, and one number at a vertex.
+    alone = float(contact.primary is None)
     d_ends, opposite = np.einsum("ej,kjc->kec", TO_ENDS, d), np.zeros((len(side), 2))
     own = _moves(held[cells.ends[side]], d_ends) / moduli[cells.owner[side], None]
     if contact.primary is not None:
@@ -372,7 +377,7 @@ def facing_sides(
         opposite = _moves(across, d_ends) / moduli[cells.owner[other], None]
     one, narrow = _merged_vertices(cells, side, every[~keep])
     vertices, most, total = one[cells.ends[side]], np.zeros(len(one)), own + opposite
-    np.maximum.at(most, vertices, np.divide(own, total, out=0 * own, where=total > 0))
+    np.maximum.at(most, vertices, np.divide(own, total, out=alone + 0 * own, where=total > 0))
     if contact.bilateral:
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
@@ -399,12 +404,20 @@ def facing_sides(
     )
 
 
-def held_motions(cells: Cells, held: Sequence[tuple[Index, Array]]) -> Array:
+def held_motions(
+    cells: Cells, held: Sequence[tuple[Index, Array]], supports: Sequence[PressureSupport]
+) -> Array:
     """Projections (nv, 2, 2) of motions of all vertices on those that conditions prescribe.
 
-    Sides and directions at their ends that are `held` (k,) and (k, 2, 2), of each condition.
+    Sides and directions at their ends that are `held` (k,) and (k, 2, 2), of each condition, and
+    those of guides and bilateral obstacles.
     """
-    M = np.zeros((len(cells.vertices), 2, 2))
+    M, held = np.zeros((len(cells.vertices), 2, 2)), list(held)
+    for support in supports:
+        contact, side = support.pair.line.contact, cells.sides_on(support.segments)
+        if contact.bilateral and contact.primary is None:
+            ends = cells.on_side(side, np.array([[0.0, 1.0]]))
+            held.append((side, at_places(partial(rays, cells.trace, contact), *ends)))
     for side, d in held:
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
     return np.asarray(M @ np.linalg.pinv(M, rcond=PARALLEL_MOTION**2, hermitian=True))
@@ -430,36 +443,6 @@ def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Ma
     for a, b in cells.ends[every[narrow]]:
         number[number == number[b]] = number[a]
     return number, narrow[: len(side)]
-
-
-def guide_sides(
-    cells: Cells, displacement: ng.CoefficientFunction, side: Index, degrees: tuple[int, int]
-) -> FacingSides:
-    """Sides `side` (k,) of Gamma_0, as bilateral contact with an obstacle without a gap.
-
-    `degrees` are those of q* and of w.
-    """
-    trace, (segment, s) = cells.trace, cells.on_side(side, POINTS[None])
-    d = at_places(trace.exact_normal, segment, s)
-    gap = -(jump(trace, displacement, (segment, s))[0] * d).sum(axis=2)  # (3.8)
-    ds = np.linalg.norm(at_places(trace.derivative, segment, s), axis=2)
-    ds *= at_places(trace.measure, segment, s) * np.abs(np.diff(cells.span[side], axis=1))
-    return FacingSides(
-        pair=None,
-        side=side,
-        other=np.full(len(side), -1),
-        there=np.zeros(gap.shape),
-        direction=d,
-        weight=WEIGHTS * ds,
-        psi=bernstein(degrees[0], POINTS),
-        gap=gap,
-        lift=-gap,
-        lifted_gap=np.zeros((len(side), degrees[1] + 1)),
-        touched=np.ones((len(side), 2), dtype=bool),
-        pressed=np.ones((len(side), degrees[0] + 1), dtype=bool),
-        share=np.ones((len(side), 2)),
-        slots=side[:0],
-    )
 
 
 def fitted(gap: Array, degree: int) -> tuple[Array, Array]:

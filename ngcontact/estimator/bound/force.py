@@ -43,10 +43,9 @@ def force_bar(
         No bar is proved.
     """
     dual, stress, B = proof.dual, proof.stress, proof.bound
-    cells, lines, each, kappa = dual.cells, dual.program.lines, iter(directions), 0.0
+    cells, lines, kappa = dual.cells, dual.program.lines, 0.0
     excess = []
-    for f in lines:
-        e = np.zeros(2) if f.pair is None else next(each)
+    for f, e in zip(lines, [*directions, np.zeros(2)], strict=False):  # 0 on guides, the last
         excess.append(_excess(cells, G, f, e))
         kappa = max(kappa, _bare(f, excess[-1][1]), _beside(cells, displacement, G, f, e))
     if not kappa < np.inf:
@@ -135,8 +134,6 @@ def _beside(
     cells: Cells, displacement: ng.GridFunction, G: ng.GridFunction, f: FacingSides, e: Array
 ) -> float:
     """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
-    if f.pair is None:
-        return 0.0
     trace, side = cells.trace, np.setdiff1d(cells.sides_on(f.pair.line.segments), f.side)
     place = cells.on_side(side, POINTS[None])
     found = opposite_points(trace, displacement, f.pair, *place)

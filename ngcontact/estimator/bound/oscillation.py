@@ -18,7 +18,6 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...problem import Problem, numbers
-from ...quadrature import SampledElements
 from .cells import Cells, alike, bisected, places
 from .elements import Element, Multipliers, projection, traces
 from .facing import POINTS, WEIGHTS
@@ -68,7 +67,7 @@ def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, ...]:
     x, slope = cells.around(at[:, None], np.arange(3), t)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
+    opposite = cells.lengths[cells.sides[at]]
     ratio, tiny = np.zeros(len(at)), np.finfo(float).tiny
     for share in [opposite / opposite.sum(axis=1, keepdims=True), *BALL_CENTRES]:
         away = x - (share[..., None] * corners).sum(axis=1)[:, None, None]
@@ -104,7 +103,7 @@ def divided(
     """
     distance, D = norms
     limit, ne = (NEGLIGIBLE_SHARE * float(np.linalg.norm(distance))) ** 2, cells.trace.mesh.ne
-    finest = SampledElements(cells.trace.mesh, 2).sizes / FINEST_PARTS
+    finest = cells.elements.sizes / FINEST_PARTS
     moduli, degree = np.full(ne, np.inf), np.zeros(ne, dtype=np.intp)
     parent = parts[0].parent
     for e in parts[1]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -77,29 +76,16 @@ class EquilibratedStress:
     proof: Proof
 
     @property
-    def degree(self) -> int:
-        """Degree of its polynomials on triangles with straight sides; about an axis of r s."""
-        return min(e.basis.degree for e in self.proof.dual.elements)
-
-    @property
-    def triangles(self) -> Array:
-        """Corners (n, 3, 2) of the triangles, lengths."""
-        return self.proof.dual.cells.corners
-
-    @property
     def element(self) -> Index:
-        """Elements (n,) of the mesh that they are, or parts of."""
+        """Elements (n,) of the mesh that the triangles are, or parts of."""
         return self.proof.dual.cells.parent
 
     @property
     def pressure(self) -> list[ContactPressure]:
         """p* of each pair."""
-        cells, found = self.proof.dual.cells, []
-        for line, p in zip(self.proof.dual.program.lines, self.proof.stress.pressure, strict=True):
-            if line.pair is not None:
-                side = line.side
-                found.append(ContactPressure(cells.segment[side], cells.span[side], p))
-        return found
+        cells, lines = self.proof.dual.cells, self.proof.dual.program.lines
+        found = zip(lines, self.proof.stress.pressure, self.proof.problem.contact, strict=False)
+        return [ContactPressure(cells.segment[x.side], cells.span[x.side], p) for x, p, _ in found]
 
     @property
     def certificate(self) -> dict[str, float]:
@@ -129,7 +115,7 @@ class EquilibratedStress:
         first = np.argsort(cells.parent, kind="stable")
         count = np.bincount(cells.parent, minlength=int(element.max(initial=0)) + 1)
         start, many = (np.cumsum(count) - count)[element], count[element]
-        x = cells.evaluate(ng.CF((ng.x, ng.y)), first[start], reference)
+        x = cells.elements.positions(element, reference)
         # Of the parts of an element the one that a place lies in, or is the nearest to.
         last, at = np.cumsum(many), np.repeat(np.arange(len(element)), many)
         part = first[np.arange(len(at)) + np.repeat(start - last + many, many)]
@@ -139,7 +125,7 @@ class EquilibratedStress:
         own = part[chosen]
         found = proof.stress.s.values(own, share[chosen, None])[:, 0]
         if found.shape[1] > 3:
-            found[:, 2] += _radial(proof, own, reference)
+            found[:, 2] += _radial(proof, element, reference[:, None])[:, 0]
         return found
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -157,11 +143,11 @@ class EquilibratedStress:
         return path
 
 
-def _radial(proof: Proof, at: Index, reference: Array) -> Array:
-    """Radial force times r, (k,), in triangles `at` (k,) at places `reference` in the parents."""
+def _radial(proof: Proof, element: Index, reference: Array) -> Array:
+    """Radial force times r, (k, n), in elements `element` (k,) at places `reference` (k, n, 2)."""
     cells = proof.dual.cells
     force = cells.trace.mesh.MaterialCF(proof.problem.force, default=ng.CF((0, 0)))
-    return cells.evaluate(ng.x * force[0], at, reference)[:, 0]
+    return cells.elements.evaluate(ng.x * force[0], element, reference)[..., 0]
 
 
 def _certificate(proof: Proof) -> dict[str, Any]:
@@ -203,14 +189,13 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         force[at] = scalars(e.basis.force_degree, e.basis.corners, x[at]) @ e.basis.force
         a, b = e.places.local.T
         weight = e.places.weight[0] / cells.measure(e.places.x[0])
-        every, places = np.repeat(at, len(a)), e.places.reference.reshape(-1, 2)
         arrays |= {
             f"rule{number}_triangle": at,
             f"rule{number}_points": np.column_stack([1 - a - b, a]),
             f"rule{number}_weights": weight / (2 * weight.sum()),
             f"rule{number}_strain": e.strain,
             f"rule{number}_compliance": e.compliance,
-            f"rule{number}_radial": _radial(proof, every, places).reshape(e.strain.shape[:2]),
+            f"rule{number}_radial": _radial(proof, cells.parent[at], e.places.reference),
         }
     # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
     side = np.flatnonzero(~cells.inner)
@@ -276,10 +261,7 @@ class Guaranteed(Estimated):
 
         With initial strains over the norm of the stress, of e(u_h) - e0.
         """
-        bound, size = self._bound.bound, self.energy_norm
-        if self.problem.strain and self.stress_free:
-            return 0.0
-        return bound / size if size > 0 else math.inf if bound > 0 else 0.0
+        return self._relative(self.error_bound)
 
     @property
     def bound_parts(self) -> dict[str, float]:

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.reference import cases
 from drivers.reference.westergaard import moduli
-from ngcontact import Elastic, Problem, solve
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.estimator.bound.cells import cells_of
 from ngcontact.estimator.bound.facing import DATA_DEGREE
 from ngcontact.estimator.bound.lifting import Prescribed, lifted
@@ -82,6 +82,22 @@ def test_the_field_of_least_energy(n, degree):
         exact = of_least_energy(u, v, degree, n)
     norms = lifted(problem, cells, whole(cells, u, v), [], degree, 1.0)
     assert (norms**2).sum() == pytest.approx(exact, rel=1e-10)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02 * ng.x])
+def test_contact_with_an_obstacle_beside_a_support(gap):
+    """Nothing is lifted at the vertex of both, which does not move."""
+    problem = Problem(
+        geometry=square(4),
+        materials={"body": LAW},
+        displacement={"left": (0, 0)},
+        traction={"top": (0, -0.1)},
+        contact=[Contact("bottom", direction=(0, -1), gap=gap)],
+    )
+    coarse, fine = (solve(problem, order=order) for order in (1, 3))
+    assert fine.error_bound < 0.5 * coarse.error_bound  # measured 0.3
+    low, high = zip(coarse.energy_bounds, fine.energy_bounds, strict=True)
+    assert max(low) <= min(high)
 
 
 def test_supports_that_elements_do_not_meet():
