@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
@@ -24,9 +24,11 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, joined, rows_of
+from ..mesh import curve
 from ..problem import POSITION, Problem, numbers, varies
 from .cells import ElementParts, SampledElements, lattice, sampled
 
+ROUND_ORDER = 12  # of a mesh without kinks: 1e-13 of the radius off circles of 13 segments
 LINE_SAMPLES = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 BODY_SPACING = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
 LATTICE_ANGLE = 0.3  # angle of their lattice, out of step with edges
@@ -155,7 +157,11 @@ def _sampled_features(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features
             spacing = float(view.sizes[elements].sum() / LINE_SAMPLES)
             chains = _chains(view, elements)
             lines = [_Line(function, view, *chain, spacing) for chain in chains]
-            found, values = _on_lines(kind, lines)
+            found, values, limit = _on_lines(kind, lines)
+            if len(found):  # on a polygon or a curved mesh a function of places has its kinks, too
+                rounder = SampledElements(curve(mesh, ROUND_ORDER, "isoparametric")[0], 1)
+                again = [replace(line, view=rounder) for line in lines]
+                found = min(found, _on_lines(kind, again, limit)[0], key=len)
             jumps += [line.jumps() for line in lines if kind == "displacement"]
         spots.append(found)
         samples, largest = samples + len(values), max(largest, float(np.abs(values).max(initial=0)))
@@ -269,10 +275,13 @@ class _Line:
         return np.column_stack([self.places(at), size])
 
 
-def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
-    """Features (k, 3) of a function along all `lines` of a boundary, and all its samples (n, c)."""
+def _on_lines(kind: str, lines: list[_Line], least: float = 0.0) -> tuple[Array, Array, float]:
+    """Features (k, 3) of a function along all `lines` of a boundary, and all its samples (n, c).
+
+    And the departure that counts, which is `least` or more.
+    """
     sampled = np.concatenate([line.sampled for line in lines])
-    _, limit = _searched(kind, sampled)
+    limit = max(_searched(kind, sampled)[1], least)
     found = [NO_JUMPS]
     for line in lines:
         components = np.hstack([line.sampled, -line.sampled]).T
@@ -286,7 +295,7 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
                 seen = [_feature(line, departure, first, last) for first, last in runs]
                 at, widths = np.reshape(seen, (-1, 2)).T
                 found.append(np.column_stack([line.places(at), widths]))
-    return np.concatenate(found), sampled
+    return np.concatenate(found), sampled, limit
 
 
 def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, adapt, s
 from ngcontact.adaptivity import refined
 from ngcontact.fem import warn_of_jumps
 from ngcontact.geometries import rings
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh import curve, first_mesh
 from ngcontact.quadrature import features_of, sample_data, unresolved
 from ngcontact.quadrature.cells import lattice
 from ngcontact.quadrature.features import steps_along
@@ -162,6 +162,18 @@ def test_circles_have_no_ends(phase):
         held = {"hole": (1e-3, 0), "rim": (0, 0)}
         pair = Contact(side, other, gap=gap)
         assert not len(found(Problem(rings(), laws, held, contact=[pair]), "gap").spots)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_corners_of_the_mesh_of_a_circle_are_no_features(order):
+    """`adapt` refined towards all, and no bound was known; a groove on the circle is one."""
+    r, groove = ng.sqrt(ng.x**2 + ng.y**2), 1e-4 * ng.exp(-((ng.y / 5e-3) ** 2))
+    for gap, count in ((1.05 - r, 0), (1e-3 * (2 - r), 0), (1.05 - r + groove, 2)):
+        pair = Contact("inner_contact", gap=gap)
+        problem = Problem(rings(), {".*": Elastic(1.0, 0.3)}, contact=[pair])
+        mesh, _ = curve(first_mesh(problem, 0.5), order, "isoparametric")
+        [one] = features_of(problem, mesh)
+        assert len(one.spots) == count
 
 
 @pytest.mark.parametrize("order", [1, 3])
