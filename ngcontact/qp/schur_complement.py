@@ -347,8 +347,8 @@ class BorderedSystems:
         if not left <= SINGULAR_RESIDUAL * scale and not left <= self._round_off(balanced):
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "
-                "can move without resistance from supports or active contact, or the moduli of "
-                "the bodies are too many powers of ten apart"
+                "can move without resistance from supports or active contact, or bends over some "
+                "1000 times its thickness, or moduli are too many powers of ten apart"
             )
 
     def _round_off(self, balanced: Mask) -> float:
