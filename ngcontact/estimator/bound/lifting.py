@@ -20,7 +20,7 @@ from numpy.polynomial import legendre
 from ...arrays import Array, Index
 from ...errors import ContactError
 from ...lagrange import gauss_lobatto, lagrange
-from ...linalg import assembled, cholesky, congruent, handed_over, shared
+from ...linalg import cholesky, lower_half, summed
 from ...problem import Problem
 from .cells import Cells, alike, places
 from .elements import BATCH_ENTRIES, BodyData
@@ -148,13 +148,12 @@ def lifted(
     first = [2 * np.searchsorted(nodes, own) for _, own, _ in stiffness]
     dofs = [np.concatenate([x, x + 1], axis=1) for x in first]
     if not held.all():
-        blocks = [(x, part) for x, (*_, part) in zip(dofs, stiffness, strict=True)]
-        matrix = assembled(blocks, w.size)
-        K, node = shared(matrix), np.arange(len(nodes) + 1)
+        blocks = [(x, x, part) for x, (*_, part) in zip(dofs, stiffness, strict=True)]
+        K, node = summed(blocks, (w.size, w.size)), np.arange(len(nodes) + 1)
         R = sp.bsr_array((V, node[:-1], node)).tocsr()
         R.eliminate_zeros()
         load = np.where(held.ravel(), 0.0, -(R.T @ (K @ w.ravel())))
-        y = cholesky(handed_over(congruent(matrix, R)[0]))(~held.ravel())(load)
+        y = cholesky(lower_half((R.T @ K @ R).tocsr()))(~held.ravel())(load)
         w += (R @ y).reshape(-1, 2)
     still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
     for (at, _, part), x in zip(stiffness, dofs, strict=True):
@@ -184,34 +183,43 @@ def _stiffness(
 ) -> Iterator[tuple[Index, Index, Array]]:
     """Stiffness of triangles of a `layer` (k,) at a time: these (b,), nodes (b, m), (b, 2 m, 2 m).
 
-    For polynomials of a `degree`, on the sides of `degrees` (e,); x components come first.
+    For polynomials of a `degree`, on the sides of `degrees` (e,), least over what is inside; x
+    components come first.
     """
-    data = BodyData.of(problem, cells.trace.mesh)
+    data, axial = BodyData.of(problem, cells.trace.mesh), cells.trace.model.extent
+    V = np.zeros((2, 2 + axial, 3 + axial))  # Voigt strains by component, of its derivatives
+    V[0, 0, 0] = V[0, 1, -1] = V[1, 0, -1] = V[1, 1, 1] = 1.0
+    V[0, 2:, 2:-1] = 1.0  # ... and of u_r / r
     kind = [degrees[cells.sides], cells.curved, data.law_varies[cells.bodies]]
-    for (*own, bent, _), every in alike(kind, layer):
+    for (*own, bent, varies), every in alike(kind, layer):
         inverse = _nodal(degree, *own)
         order, m = 2 * max(own) + 4 * bent, len(inverse)
         for at in np.array_split(every, 1 + len(every) * order**2 * m // BATCH_ENTRIES):
             points = places(cells, at, order)
-            f, *by = np.moveaxis(_functions(degree, own, points.local) @ inverse, 1, 0)
-            into = np.linalg.inv(points.slopes)
-            gradient = into.swapaxes(2, 3) @ np.stack(by, axis=1)
-            weight = points.weight[..., None, None]
-            C = weight * np.linalg.inv(data.compliance(points))
-            B = np.zeros((*points.weight.shape, C.shape[-1], 2 * m))  # Voigt
-            B[:, :, 0, :m] = B[:, :, -1, m:] = gradient[:, :, 0]
-            B[:, :, 1, m:] = B[:, :, -1, :m] = gradient[:, :, 1]
-            if B.shape[2] > 3:
-                B[:, :, 2, :m] = f / points.x[..., :1]
-            stress, strain = (x.reshape(len(at), -1, 2 * m) for x in (C @ B, B))
+            F, into = _functions(degree, own, points.local) @ inverse, np.linalg.inv(points.slopes)
+            C = np.linalg.inv(data.compliance(points))
+            S = [V[c] @ C @ V[d].T for c, d in ((0, 0), (0, 1), (1, 1))]
+            if bent or varies or axial:
+                rows = into.swapaxes(2, 3) @ F[:, 1:]
+                if axial:
+                    rows = np.append(rows, F[:, :1] / points.x[..., :1, None], axis=2)
+                stress = [(points.weight[..., None, None] * x) @ rows for x in S]
+                rows, *stress = (x.reshape(len(at), -1, m) for x in (rows, *stress))
+                xx, xy, yy = (rows.transpose(0, 2, 1) @ x for x in stress)
+            else:  # integrals of products of derivatives are those of one triangle
+                w, into = points.weight, into[:, 0]
+                table = np.einsum("q,qim,qjn->ijmn", w[0], F[:, 1:], F[:, 1:], optimize=True)
+                size = (w[:, 0] / w[0, 0])[:, None, None]
+                by = [(size * (into @ x[:, 0] @ into.swapaxes(1, 2))).reshape(-1, 4) for x in S]
+                xx, xy, yy = ((x @ table.reshape(4, -1)).reshape(-1, m, m) for x in by)
+            K = np.block([[xx, xy], [xy.transpose(0, 2, 1), yy]])
+            outer = np.arange(2 * m) % m < sum(own)
+            whole, across = K[:, outer][..., outer], K[:, ~outer][..., outer]
+            whole -= across.transpose(0, 2, 1) @ np.linalg.solve(K[:, ~outer][..., ~outer], across)
             on = [_on_sides(cells, cells.sides[at, i], n)[:, 1:-1] for i, n in enumerate(own)]
             back = cells.backward[at]
             on = [np.where(back[:, i, None], x[:, ::-1], x) for i, x in enumerate(on)]
-            inside = m - sum(own)
-            first = len(cells.vertices) + (DATA_DEGREE - 1) * len(cells.ends)
-            rest = first + inside * at[:, None] + np.arange(inside)
-            number = np.hstack([cells.triangles[at], *on, rest])
-            yield at, number, strain.transpose(0, 2, 1) @ stress
+            yield at, np.hstack([cells.triangles[at], *on]), whole
 
 
 @lru_cache
