@@ -3,10 +3,10 @@ from .coarse_spaces import coarsenings as coarsenings
 from .iterative import IterativeSystems as IterativeSystems
 from .multigrid import Multigrid as Multigrid
 from .multigrid import truncated_multigrid as truncated_multigrid
-from .sparse import assembled as assembled
 from .sparse import cholesky as cholesky
 from .sparse import cholesky_of_closed_rows as cholesky_of_closed_rows
 from .sparse import congruent as congruent
 from .sparse import handed_over as handed_over
 from .sparse import lower_half as lower_half
 from .sparse import shared as shared
+from .sparse import summed as summed

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
-from ..arrays import Array, Factor, Index, Mask, Solve
+from ..arrays import Array, Factor, Index, Mask, Solve, from_triplets
 from ..threads import one_thread
 
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
@@ -46,27 +46,41 @@ def reversed_order(matrix: ng.BaseMatrix) -> ng.BaseMatrix:
 
 
 def _from_entries(
-    row: Sequence[Index], column: Sequence[Index], values: Sequence[Array], shape: tuple[int, int]
+    row: Index, column: Index, values: Array, shape: tuple[int, int], some: Mask | None = None
 ) -> Any:
-    """NGSolve's matrix (m, n), its `shape`, the sum of parts `values` (k,) at `row`, `column`."""
-    entries = []
+    """NGSolve's matrix (m, n), its `shape`, of `values` (k,) at `row` and `column` (k,), summed.
+
+    Of all or `some` (k,) of them.
+    """
+    entries, size = [], len(row) if some is None else np.count_nonzero(some)
     # NumPy arrays as arguments would be converted entry by entry, at ten times the price.
-    for kind, parts in ((Array_I_S, row), (Array_I_S, column), (Array_D_S, values)):
-        entries.append(kind(sum(map(len, parts))))
-        np.concatenate(parts, out=entries[-1].NumPy(), casting="same_kind")
+    for kind, x in ((Array_I_S, row), (Array_I_S, column), (Array_D_S, values)):
+        entries.append(kind(size))
+        if some is None:
+            entries[-1].NumPy()[:] = x
+        else:
+            np.compress(some, x, out=entries[-1].NumPy())
     return ng.la.SparseMatrixd.CreateFromCOO(*entries, *shape)
 
 
 def _rows(K: sp.csr_array) -> Index:
     """Row (k,) of each entry."""
-    return np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
+    return np.repeat(np.arange(K.shape[0], dtype=np.int32), np.diff(K.indptr))
 
 
-def assembled(blocks: Sequence[tuple[Index, Array]], n: int) -> ng.BaseMatrix:
-    """NGSolve's matrix (n, n), a sum: `blocks` (b, k) and (b, k, k) are unknowns and values."""
-    row = [np.repeat(at, at.shape[1]) for at, _ in blocks]
-    column = [np.tile(at, at.shape[1]).ravel() for at, _ in blocks]
-    return _from_entries(row, column, [values.ravel() for _, values in blocks], (n, n))
+def summed(blocks: Sequence[tuple[Index, Index, Array]], shape: tuple[int, int]) -> sp.csr_array:
+    """SciPy's matrix (m, n), its `shape`, a sum: dense `blocks` (b, i), (b, j) and (b, i, j).
+
+    They are rows, columns and values, of b of one shape, or of one without b.
+    """
+    size, end = sum(values.size for *_, values in blocks), 0
+    row, column, entries = np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size)
+    for at, across, values in blocks:
+        start, end = end, end + values.size
+        row[start:end] = np.repeat(at.astype(np.int32), across.shape[-1], axis=-1).ravel()
+        column[start:end] = np.tile(across.astype(np.int32), at.shape[-1]).ravel()
+        entries[start:end] = values.ravel()
+    return from_triplets(entries, row, column, shape)
 
 
 def handed_over(K: sp.sparray) -> ng.BaseMatrix:
@@ -77,14 +91,13 @@ def handed_over(K: sp.sparray) -> ng.BaseMatrix:
         memory = memory.base
     if isinstance(memory, _View) and (memory.owner.shape, memory.owner.nze) == (K.shape, K.nnz):
         return memory.owner
-    return _from_entries([_rows(K)], [K.indices], [K.data], K.shape)
+    return _from_entries(_rows(K), K.indices, K.data, K.shape)
 
 
 def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
     """Lower half of the symmetric `K` (n, n) for NGSolve: what its Cholesky factorisation reads."""
     row = _rows(K)
-    lower = K.indices <= row
-    return _from_entries([row[lower]], [K.indices[lower]], [K.data[lower]], K.shape)
+    return _from_entries(row, K.indices, K.data, K.shape, K.indices <= row)
 
 
 def congruent(matrix: ng.BaseMatrix, T: sp.csr_array) -> tuple[sp.csr_array, ng.BaseMatrix | None]:

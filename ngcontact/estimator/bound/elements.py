@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index, Mask, rows_of
+from ...arrays import Array, Index, Mask
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, numbers, varies
@@ -93,14 +94,6 @@ class Element:
         mine = np.flatnonzero(own[some] == at)
         return mine, some[mine]
 
-    def part(self, rows: Index, cells: Cells, at: Index, mu: Multipliers) -> Element:
-        """Its triangles `rows` (r,), which are `at` (r,) of other `cells`, with multipliers mu."""
-        names = "compliance strain missed modulus combined N own g beyond".split()
-        places = replace(rows_of(self.places, rows, "x", "slopes", "weight"), cells=cells, at=at)
-        dofs = mu.of(cells.sides[at])[0].reshape(len(at), -1)
-        part = rows_of(self, rows, *names)
-        return replace(part, places=places, basis=self.basis.part(rows), dofs=dofs)
-
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
         return np.asarray(self.own + (c[:, None] @ self.N)[:, 0])
@@ -109,11 +102,16 @@ class Element:
         """N mu (b, m): what all multipliers of the mesh, `mu` (k,), add to c."""
         return np.asarray((self.N @ mu[self.dofs][..., None])[..., 0])
 
+    @cached_property
+    def _polynomials(self) -> tuple[Array, Array]:
+        """T as of `stresses` at the points."""
+        return self.basis.at(self.places.affine)[0]
+
     def of_strain(self, strain: Array) -> Element:
         """These triangles for a displacement of `strain` (b, q, v), without body forces."""
         basis = replace(self.basis, force=np.zeros_like(self.basis.force))
-        T, _ = basis.at(self.places.affine)
-        _, g, beyond = _nearest(T, self.places.weight, self.compliance, strain, self.combined)
+        given = self.places.weight, self.compliance, strain, self.combined
+        _, g, beyond = _nearest(self._polynomials, *given)
         none = {name: np.zeros_like(getattr(self, name)) for name in ("missed", "own")}
         return replace(self, basis=basis, strain=strain, g=g, beyond=beyond, **none)
 
@@ -122,11 +120,8 @@ class Element:
 
         At (a, b) `local` (k, q, 2), or (q, 2) in each.
         """
-        (A, P), s_p = self.basis.part(some).at(local)
-        c = (self.combined @ c[..., None])[some]
-        *_, k, m = P.shape
-        s = A @ (P.reshape(*P.shape[:-3], -1, m) @ c).reshape(len(c), -1, k, 1)
-        return np.asarray(s[..., 0] + s_p)
+        T, s_p = self.basis.part(some).at(local)
+        return _stress(T, (self.combined @ c[..., None])[some, :, 0]) + s_p
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,43 +239,21 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
 
 
 def elements_of(
-    problem: Problem,
-    cells: Cells,
-    displacement: ng.CoefficientFunction,
-    degree: int,
-    known: Sequence[tuple[Cells, Multipliers, Sequence[Element]]] = (),
+    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
-    Stresses are of a `degree` on triangles with straight sides. Triangles of other cells that are
-    `known` are not condensed again.
+    Stresses are of a `degree` on triangles with straight sides.
     """
     mu, data = multipliers(problem, cells, degree), BodyData.of(problem, cells.trace.mesh)
     highest = mu.degree[cells.sides].max(axis=1)
     varying = data.varies[cells.bodies]
     kind = [mu.of_stress, highest, cells.on_axis, cells.curved, varying]
-    strain, found, rest = elastic_strain(problem, displacement), [], np.ones(len(highest), bool)
-    for other, multipliers_, elements in known:
-        both = (_identity(other, multipliers_), _identity(cells, mu))
-        _, first, same = np.unique(
-            np.concatenate(both), axis=0, return_index=True, return_inverse=True
-        )
-        before = first[same.ravel()[len(both[0]) :]]
-        rest &= before >= len(both[0])
-        for e in elements:
-            at, rows = e.among(before)
-            if at.size:
-                found.append(e.part(rows, cells, at, mu))
-    for (n, *_), every in alike(kind, np.flatnonzero(rest)):
+    strain, found = elastic_strain(problem, displacement), []
+    for (n, *_), every in alike(kind, np.arange(len(highest))):
         for at in np.array_split(every, 1 + len(every) * (n + 2) ** 4 // BATCH_ENTRIES):
             found.append(_element(data, cells, strain, mu, at))
     return mu, found
-
-
-def _identity(cells: Cells, mu: Multipliers) -> Array:
-    """Rows (n, 14) of numbers that are the same for triangles which are condensed alike."""
-    parts = cells.parent, cells.corners, mu.of_stress, mu.degree[cells.sides], cells.backward
-    return np.column_stack([np.asarray(x, dtype=float).reshape(len(x), -1) for x in parts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +332,7 @@ def _element(
     T, s_p = basis.at(points.affine)
     if axial:
         s_p[..., 2] += hoop
-    rest = strain - (compliance @ s_p[..., None])[..., 0]
+    rest = strain - products(compliance, s_p)
     combined, g, beyond = _nearest(T, points.weight, compliance, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
@@ -391,16 +364,58 @@ def _nearest(
 
     For stresses T, as of `stresses`, in the norm of C^-1, `compliance`, by a `weight` (b, q).
     """
-    (A, P), root, L = T, np.sqrt(weight)[..., None, None], np.linalg.cholesky(compliance)
-    rest = (np.linalg.inv(L) @ (root * strain[..., None])).reshape(len(weight), 1, -1)
-    rows = ((root * (L.swapaxes(2, 3) @ A)) @ P).reshape(len(weight), -1, P.shape[-1])
+    (A, P), root, L = T, np.sqrt(weight)[..., None], np.linalg.cholesky(compliance)
     if combined is None:
-        combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
-    g = np.zeros((len(rows), 1, combined.shape[2]))
+        M = L.swapaxes(2, 3) @ A
+        if P.ndim == 3 and M.shape[1] == 1:  # one M on a triangle, one P on all
+            rows = M.reshape(-1, M.shape[-1]) @ P.swapaxes(0, 1).reshape(M.shape[-1], -1)
+            rows = rows.reshape(*M.shape[::2], *P.shape[::2]) * root[:, None, :]
+        else:
+            rows = (root[..., None] * M) @ P
+        rows = rows.reshape(len(weight), -1, P.shape[-1])
+        combined = _inverses(np.asarray(np.linalg.qr(rows, mode="r")))
+    g, rest = np.zeros((len(weight), combined.shape[2])), strain
     for _ in range(2):  # once more, as they are orthonormal but for round-off
-        more = rest @ rows @ combined
-        g, rest = g + more, rest - more @ combined.swapaxes(1, 2) @ rows.swapaxes(1, 2)
-    return combined, g[:, 0], (rest**2).sum(axis=(1, 2))
+        more = (_work(T, weight[..., None] * rest)[:, None] @ combined)[:, 0]
+        s = _stress(T, (combined @ more[..., None])[..., 0])
+        g, rest = g + more, rest - products(compliance, s)
+    return combined, g, ((root * products(np.linalg.inv(L), rest)) ** 2).sum(axis=(1, 2))
+
+
+def _inverses(R: Array) -> Array:
+    """Inverses of upper triangular matrices `R` (b, n, n), row by row for all at once.
+
+    LAPACK's LU of one after the other takes twice the time.
+    """
+    found = np.zeros_like(R)
+    for i in reversed(range(R.shape[1])):
+        found[:, i, i] = 1.0
+        found[:, i, i + 1 :] = -(R[:, i, None, i + 1 :] @ found[:, i + 1 :, i + 1 :])[:, 0]
+        found[:, i, i:] /= R[:, i, i, None]
+    return found
+
+
+def products(C: Array, e: Array) -> Array:
+    """C e (b, q, v) for `e` (b, q, v) and `C` (b, q, v, v), or (b, 1, v, v), one in a triangle."""
+    if C.shape[1] == 1:
+        return np.asarray(e @ C[:, 0].swapaxes(1, 2))
+    return np.asarray((C @ e[..., None])[..., 0])
+
+
+def _stress(T: tuple[Array, Array], c: Array) -> Array:
+    """Stresses (b, q, v) of coefficients `c` (b, n) of the polynomials T, as of `stresses`."""
+    A, P = T
+    table = P.reshape(*P.shape[:-3], -1, P.shape[-1])
+    values = c @ table.T if table.ndim == 2 else (table @ c[..., None])[..., 0]
+    return np.asarray(values.reshape(len(c), -1, P.shape[-2]) @ A[:, 0].swapaxes(1, 2))
+
+
+def _work(T: tuple[Array, Array], strain: Array) -> Array:
+    """Sums (b, n) over points of T times a `strain` (b, q, v): the adjoint of `_stress`."""
+    A, P = T
+    table = P.reshape(*P.shape[:-3], -1, P.shape[-1])
+    values = (strain @ A[:, 0]).reshape(len(strain), -1)
+    return np.asarray(values @ table if table.ndim == 2 else (values[:, None] @ table)[:, 0])
 
 
 def _moments(cells: Cells, mu: Multipliers, at: Index, basis: Basis) -> tuple[Array, Array, Index]:

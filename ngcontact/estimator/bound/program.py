@@ -18,9 +18,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from ...arrays import Array, Index, Mask, from_triplets
+from ...arrays import Array, Index, Mask
 from ...errors import ContactError
-from ...linalg import assembled, cholesky, handed_over, shared
+from ...linalg import cholesky, lower_half, summed
 from ...qp import (
     BorderedSystems,
     QuadraticProgram,
@@ -68,7 +68,7 @@ class DualProgram:
     @cached_property
     def systems(self) -> BorderedSystems:
         """Its linear systems, factorised when the first is solved."""
-        return BorderedSystems(self.program, cholesky(handed_over(self.program.K)))
+        return BorderedSystems(self.program, cholesky(lower_half(self.program.K)))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factor, which is made again."""
@@ -178,7 +178,7 @@ def dual_program(
     R, T = _basis(mu, lines, unknown)
     other = abs(T - sp.eye_array(d)).sum(axis=1) > 0
     parts = (part for e in elements for part in _of_unknowns(e, T, other))
-    K = shared(assembled([(at, N.transpose(0, 2, 1) @ N) for at, N in parts], d))
+    K = summed([(at, at, N.transpose(0, 2, 1) @ N) for at, N in parts], (d, d))
     size = K.diagonal()
     K.setdiag((1 + DIAGONAL_SHIFT) * size)
     idle = fixed | (size <= AXIS_STIFFNESS * size.max())  # on the axis there is no traction
@@ -228,12 +228,12 @@ def _basis(
         R = -(load[some] @ traces(at.shape[1] // 2 - 1, line.there[some])[:, None])
         R = R.reshape(*row[some].shape, at.shape[1]) * there[:, None]
         across.append((row[some], at, R))
-    part = _summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
-    R = _summed(across, (m, d))
+    part = summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
+    R = summed(across, (m, d))
     M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary
     while (part := M @ part).nnz:  # as often as bodies stand in a row
         T = T + part
-    return _summed(own, (m, d)) + R, T
+    return summed(own, (m, d)) + R, T
 
 
 def _of_unknowns(e: Element, T: sp.csr_array, other: Mask) -> list[tuple[Index, Array]]:
@@ -252,12 +252,3 @@ def _of_unknowns(e: Element, T: sp.csr_array, other: Mask) -> list[tuple[Index, 
     part = np.zeros((b, d, own.shape[1]))
     part[of, row, place - start[of]] = rows.data
     return [(e.dofs[~some], e.N[~some]), (key[own] % T.shape[1], e.N[some] @ part)]
-
-
-def _summed(
-    blocks: Sequence[tuple[np.ndarray, np.ndarray, Array]], shape: tuple[int, int]
-) -> sp.csr_array:
-    """Sparse sum of dense blocks: of each, or of several of one shape, rows, columns and values."""
-    row = _joined([np.repeat(i, j.shape[-1], axis=-1) for i, j, _ in blocks], np.int32)
-    column = _joined([np.tile(j, i.shape[-1]) for i, j, _ in blocks], np.int32)
-    return from_triplets(_joined([values for *_, values in blocks]), row, column, shape)
