@@ -7,7 +7,7 @@ import numpy as np
 from netgen.meshing import IdentificationType
 
 from ..arrays import Array, Integers
-from ..problem import KEPT, MeshArrays
+from ..problem import KEPT, POSITION, MeshArrays
 from .cad import CadEdge, cad_edges
 from .faces import curved_facets
 
@@ -19,6 +19,7 @@ SMALL_EDGE = 1e-2  # extent of an edge; measured: all but arcs of circles are wr
 # A segment of a curved edge; measured: elements of order 4 turn over at 5e-7.
 MIN_CURVED_LENGTH = 1e-6
 SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
+CURVE_DISTANCE = 1e-12  # of a curved boundary from its elements, relative to positions: round-off
 
 
 def vertex_parents(mesh: ng.Mesh) -> Integers:
@@ -86,19 +87,26 @@ def check_curves(mesh: ng.Mesh) -> None:
             )
 
 
+def _straightened(mesh: ng.Mesh) -> bool:
+    """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
+    off = ng.BoundaryFromVolumeCF(POSITION) - POSITION
+    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, POSITION))
+    return bool(missed > CURVE_DISTANCE**2 * size)
+
+
 def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     """Mesh curved to the element's degree, and the number of elements at curved edges or faces.
 
     A mesh of that degree is used as it is, and so is one without an OCC geometry or without curved
-    edges; otherwise the result is a copy. So it is of a mesh with halved edges, which NGSolve's
-    `Refine` straightened and keeps among those in use: a file of the mesh has none, and numbers
-    the edges otherwise.
+    edges; otherwise, also after NGSolve's `Refine` has straightened it, the result is a copy. So it
+    is of a mesh with halved edges, which `Refine` keeps among those in use: a file of the mesh has
+    none, and numbers the edges otherwise.
     """
     count, degree = int(np.count_nonzero(curved_facets(mesh))), mesh.GetCurveOrder()
     if count:
         degree = order if element == "isoparametric" else order + 1  # (2.8)
     halved = ng.H1(mesh, order=2).ndof < mesh.nv + mesh.nedge
-    if mesh.GetCurveOrder() == degree and not halved:
+    if mesh.GetCurveOrder() == degree and not (halved or (count and _straightened(mesh))):
         return mesh, count
     copy = copied(mesh)
     copy.Curve(degree)

@@ -39,11 +39,14 @@ def test_curve_copies_only_where_it_must():
     assert curved.GetCurveOrder() == 2
 
 
+@pytest.mark.parametrize("marked", [True, False])
 @pytest.mark.parametrize("order", [2, 3])
-def test_elements_that_refinement_straightened_are_curved_again(order):
-    """NGSolve's Refine leaves the curve order as it was, and the elements straight."""
+def test_elements_that_refinement_straightened_are_curved_again(order, marked):
+    """NGSolve's Refine keeps the curve order, and straightens all elements, marked or not."""
     mesh = mesh_of(disc())
     mesh.Curve(order)
+    for element in mesh.Elements():
+        mesh.SetRefinementFlag(element, marked)
     mesh.Refine()
     assert mesh.GetCurveOrder() == order
     again, _ = curve(mesh, order, "isoparametric")
