@@ -202,7 +202,7 @@ def _bound(
     cells = divided(problem, cells, (parts, found.dual.elements), (c, D), linked)
     parts, _ = parted(cells, dependent(cells, loaded, supported))
     try:
-        other = _proof(problem, parts, displacement, reaches)
+        other = _proof(problem, parts, displacement, reaches, [found.dual])
     except ContactError as error:
         warn(
             f"the guaranteed bound is wide: {found.parts['loads'] / found.bound**2:.0%} of its "
@@ -229,8 +229,9 @@ def _proof(
     cells: Cells,
     displacement: ng.GridFunction,
     reaches: Sequence[PressureSupport],
+    known: Sequence[DualProblem] = (),
 ) -> Proof:
-    """The bound on given cells."""
+    """The bound on given cells; triangles that other problems have too are `known`."""
     trace = cells.trace
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
@@ -238,7 +239,8 @@ def _proof(
         degree = max(degree, FORCED_DEGREE)
     # 2. Stresses.
     given = boundary_data(problem, cells)
-    mu, elements = elements_of(problem, cells, displacement, degree)
+    before = [(x.cells, x.program.multipliers, x.elements) for x in known]
+    mu, elements = elements_of(problem, cells, displacement, degree, before)
     # 3. The gap, on guides and on Gamma_K.
     prescribed = prescribed_on_supports(problem, cells, displacement)
     holding = [(x.side, x.direction[:, [0, -1]]) for x in prescribed]
