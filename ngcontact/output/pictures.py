@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, Index
 from ..solved import Solved
-from .files import check_path, replacing
+from .files import check_path, replacing, several
 from .scene import Scene, Style, coordinates, picture
 
 if TYPE_CHECKING:
@@ -158,9 +159,9 @@ def write_film(
         No solutions, titles of another number, an option that is none, a path that cannot be
         written: before any work.
     """
-    from matplotlib.animation import PillowWriter
+    from PIL import Image
 
-    frames, style = list(solutions), Style(**options)
+    frames, style = list(several(solutions)), Style(**options)
     if not frames:
         raise ValueError("solutions: give one at least")
     if titles is not None and len(titles) != len(frames):
@@ -172,22 +173,35 @@ def write_film(
     target = check_path(path, ".gif")
     scale = min(picture(solution, style).scale for solution in frames)
     scenes = [picture(solution, replace(style, scale=scale)) for solution in frames]
-    view, figure = view_of(scenes), new_figure(target)
+    view = view_of(scenes)
     titles = titles or [
         f"{k + 1} of {len(frames)}: {s.displacement.space.ndof} unknowns"
         for k, s in enumerate(frames)
     ]
-    frames_per_second: Any = 1 / seconds
-    film = PillowWriter(frames_per_second)
-    with replacing(target) as (draft,), film.saving(figure, draft, FILM_DPI):
-        for scene, title in zip(scenes, titles, strict=True):
-            figure.clear()
-            draw_scene(figure, scene, view)
-            figure.suptitle(title)
-            film.grab_frame()
-        for _ in range(FILM_LAST - 1):
-            film.grab_frame()
+    images = [_frame(scene, title, view) for scene, title in zip(scenes, titles, strict=True)]
+    # A common palette: one stress has one colour in all frames.
+    every, plain = Image.fromarray(np.vstack(images)), Image.Dither.NONE
+    palette = every.quantize(256, method=Image.Quantize.MAXCOVERAGE)
+    first, *others = (Image.fromarray(x).quantize(palette=palette, dither=plain) for x in images)
+    times = [round(1000 * seconds)] * len(others) + [round(1000 * FILM_LAST * seconds)]
+    shown: dict[str, Any] = {"append_images": others, "duration": times, "loop": 0}
+    with replacing(target) as (draft,):
+        first.save(draft, format="GIF", save_all=True, **shown)
     return target
+
+
+def _frame(scene: Scene, title: str, view: View) -> NDArray[np.uint8]:
+    """A frame of a film, (height, width, 3) of bytes."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(layout="constrained", dpi=FILM_DPI)
+    draw_scene(figure, scene, view)
+    figure.suptitle(title)
+    canvas = FigureCanvasAgg(figure)
+    for _ in range(2):  # labels move with the ticks that a first layout leaves
+        canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def corners(scenes: Sequence[Scene]) -> Window:

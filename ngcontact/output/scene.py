@@ -352,7 +352,8 @@ def _chosen_scale(solution: Solved, place: Array, move: Array) -> float:
             zone = np.ptp(solution.points[solution.active], axis=0).max()
             overlap = np.full(len(state.gap), 0.003 * max(zone, 0.01 * size))
         initial = np.abs(state.line.gap)
-        closed = np.maximum(initial - state.gap, 1e-12 * size)
-        factor = min(factor, ((initial + overlap) / closed).min(initial=np.inf))
+        closed = initial - state.gap
+        some = closed > 1e-12 * size  # others stand still or open
+        factor = min(factor, ((initial + overlap)[some] / closed[some]).min(initial=np.inf))
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(1.0, *(k * power for k in (0.5, 1, 2, 5) if k * power <= factor)))

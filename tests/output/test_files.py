@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ngcontact import plot_convergence, write_film
+from ngcontact import plot_convergence, write_film, write_series
 from ngcontact.fem import von_mises
 from ngcontact.output.files import check_path, replacing
 from tests.output.solutions import disc
@@ -56,8 +56,13 @@ def test_the_last_frame_is_seen_three_times_as_long(tmp_path):
         for k in range(film.n_frames):
             film.seek(k)
             times.append(film.info["duration"])
-    assert times[:2] == [250, 250]
-    assert sum(times[2:]) == 750
+    assert times == [250, 250, 750]
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_film, "a.gif"), (write_series, "a.pvd")])
+def test_one_solution_is_no_series(tmp_path, write, name):
+    with pytest.raises(TypeError, match="is a Solution: give a list of Solution"):
+        write(tmp_path / name, disc())
 
 
 def test_von_mises_of_large_stresses():

@@ -216,14 +216,15 @@ def test_without_contact_there_is_no_pressure_to_draw(tmp_path):
     assert write_film(tmp_path / "a.gif", [solution]).exists()
 
 
-def test_bodies_that_come_nearer_are_drawn_apart_and_without_the_colours_of_round_off():
-    """One moves by half of the gap; twice as far the picture would show contact."""
+@pytest.mark.parametrize("move", [-0.1, 0.3])
+def test_bodies_that_do_not_touch_are_drawn_apart_and_without_the_colours_of_round_off(move):
+    """One moves by half of the gap, or away by more: twice as near it would show contact."""
     problem = Problem(
         geometry=compound(
             rectangle("lower", (0, 2), (-2, 0)), rectangle("upper", (0, 2), (0.2, 2))
         ),
         materials={"lower|upper": Elastic(E=1.0, nu=0.3)},
-        displacement={"lower_bottom": (0, 0), "upper_top": (0, -0.1)},
+        displacement={"lower_bottom": (0, 0), "upper_top": (0, move)},
         contact=[Contact("upper_bottom", "lower_top")],
     )
     solution = solve(problem, maxh=0.7, order=2)
