@@ -45,15 +45,18 @@ def test_interpolation_reproduces_polynomials_of_its_degree(order):
     np.testing.assert_allclose(error, expected, atol=2e-14)
 
 
+@pytest.mark.parametrize("at_ends", [False, True])
 @pytest.mark.parametrize("order", ORDERS)
-def test_zeros_are_all_changes_of_sign(order):
-    """Of polynomials by their roots, inside and outside, apart by a twenty-fifth at least."""
+def test_zeros_are_all_changes_of_sign(order, at_ends):
+    """Of polynomials by their roots, inside, outside and at ends, a hundredth apart at least."""
     rng = np.random.default_rng(order)
     places = -0.49 + 0.04 * np.arange(50)  # 0 and 1 are none of them
     roots = np.array([rng.choice(places, order, replace=False) for _ in range(200)])
+    if at_ends:
+        roots[:, 0] = np.arange(200) % 2
     values = np.prod(gauss_lobatto(order)[:, None] - roots[:, None], axis=2)
     number, s = zeros(order, values)
-    inside = (roots > 0) & (roots < 1)
+    inside = (roots >= 0) & (roots <= 1)
     np.testing.assert_array_equal(np.bincount(number, minlength=200), inside.sum(axis=1))
     expected = np.sort(np.where(inside, roots, np.inf), axis=1)
     # Round-off of coefficients over the product of distances of roots, at least 1e-5 at degree 5.
