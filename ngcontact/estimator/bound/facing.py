@@ -338,10 +338,12 @@ def facing_sides(
     # are not the same on two sides of a narrow gap.
     nodes = found.gap[keep, 1:-1] @ TO_LOBATTO.T
     nodes[:, [0, -1]] = np.where(found.faces[keep][:, [0, -1]], ends, nodes[:, [0, -1]])
-    # No Legendre polynomials that only round-off of coordinates has: w would have their degrees.
+    # No Legendre polynomials that only round-off has, of coordinates where these say how far it is:
+    # w would have their degrees.
+    size = abs(contact.gap) if isinstance(contact.gap, float) else np.abs(cells.vertices).max()
     modes = nodes @ (TO_LEGENDRE @ lagrange(DATA_DEGREE, POINTS)).T
     largest = np.maximum.accumulate(np.abs(modes[:, ::-1]), axis=1)[:, ::-1]
-    modes[largest <= POSITION_NOISE * np.abs(cells.vertices).max()] = 0.0
+    modes[largest <= POSITION_NOISE * size] = 0.0
     gap = modes @ LEGENDRE.T
     other, there = np.full(len(side), -1), np.zeros(gap.shape)
     if contact.primary is not None:
