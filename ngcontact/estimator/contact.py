@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -43,6 +43,8 @@ SAME_DIRECTION_COSINE = 1 - 1e-6
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas.
 BUMP_FACTOR = 2.0
+# Parts of a line by which gaps that are functions are integrated: of 60 waves each has four.
+GAP_PIECES = 256
 
 
 def covered_parts(
@@ -80,6 +82,20 @@ def remaining(inner: Mask, covered: list[Parts]) -> Parts:
     left = (number[1:] == number[:-1]) & (high - low > SLIVER)
     number = number[1:][left]
     return Parts(number, low[left] - 2 * number, high[left] - 2 * number)
+
+
+def as_fine_as_gap(
+    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces
+) -> FacingPieces:
+    """Pieces no longer than a `GAP_PIECES`-th of all, where the gap is a function."""
+    if line.contact.gap is None or isinstance(line.contact.gap, float):
+        return pieces
+    size = boundary.lengths(line.segments)[pieces.local] * pieces.share
+    count = np.ceil(GAP_PIECES * size / size.sum()).astype(np.intp)
+    last, share = np.cumsum(count), (pieces.share / count).repeat(count)
+    pieces = rows_of(pieces, np.arange(len(count)).repeat(count))
+    start = pieces.start + share * (np.arange(last[-1]) - (last - count).repeat(count))
+    return replace(pieces, corners=np.stack([start, start + share], axis=1), share=share)
 
 
 def directions(
@@ -219,8 +235,8 @@ def on_contact(
     covered = covered_parts(boundary, line, rows_of(pieces, held), int(held[:whole].sum()))
     if len(pieces.local) == 0:
         return [], covered
-    order = 2 * solution.order + DATA_BONUS
-    points = facing_points(boundary, line, pieces, order)
+    order, fine = 2 * solution.order + DATA_BONUS, as_fine_as_gap(boundary, line, pieces)
+    points = facing_points(boundary, line, fine, order)
     nodal = _pressure_on_segments(nodal, boundary.places(line.segments))
     pressure = (boundary.shapes(*points.own[:2]) * nodal[points.local]).sum(axis=1) / solution.unit
     full = np.asarray(active.all(axis=1))[points.local]
