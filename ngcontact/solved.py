@@ -191,7 +191,7 @@ class Solved:
         """
         state, trace = state_of(self.pairs, pair), self.discrete.space.trace
         if isinstance(trace, FacetTrace):
-            return curves_at_ends(signed_distance(self.problem, trace, state))
+            return curves_at_ends(signed_distance(self.problem, self.moduli, trace, state))
         return state.transitions.position
 
     @cached_property

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, Index, Mask, paths
-from ..fem import FacetTrace, contact_modulus, moduli_of
+from ..fem import FacetTrace, Moduli, contact_modulus
 from ..problem import Problem
 from ..reference import triangle
 from .state import ContactState
@@ -32,7 +32,9 @@ class SignedDistance:
     name: Index  # (k, q) numbers of nodes, one for each side of an edge of the body
 
 
-def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) -> SignedDistance:
+def signed_distance(
+    problem: Problem, moduli: Moduli, trace: FacetTrace, state: ContactState
+) -> SignedDistance:
     """The distance from the end of a pair's contact, positive inside it."""
     line, m, active = state.line, len(state.gap), state.active
     nodes = trace.nodes[line.segments]
@@ -48,7 +50,7 @@ def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) ->
     opened = np.where(active, 0.0, np.maximum(state.gap, 0.0) ** (2 / 3))
     slope = _slope(trace, line.segments, name, at_nodes(opened), at_nodes(closed))
     sides = trace.element[line.segments], trace.element[line.facing]
-    K = 0.75 * contact_modulus(problem, moduli_of(problem, trace.mesh), *sides) * slope**1.5
+    K = 0.75 * contact_modulus(problem, moduli, *sides) * slope**1.5
     if 0 < K**2 < np.inf:
         value = np.where(active, np.maximum(closed / K**2, INSIDE_DISTANCE), -opened / slope)
     else:  # nothing is open, or without a slope: ends lie midway between nodes

@@ -131,10 +131,10 @@ def _apart(columns: Columns) -> list[Columns]:
 
 def separated(vectors: Array, places: Index) -> Index:
     """Places (q,) among `places` (k,) at which the `vectors` (n, q) are most independent."""
-    count = min(vectors.shape[1], places.size)
-    return (
-        places[qr(vectors[places].T, mode="r", pivoting=True)[1][:count]] if count else places[:0]
-    )
+    some = vectors[places].T
+    if some.size == 0:
+        return places[:0]
+    return np.asarray(places[qr(some, mode="r", pivoting=True)[1][: len(some)]])
 
 
 @dataclass(frozen=True, eq=False)

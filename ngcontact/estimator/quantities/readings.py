@@ -83,7 +83,8 @@ class Measured(Guaranteed):
         """
         state, trace = state_of(self.pairs, pair), self.discrete.space.trace
         if isinstance(trace, FacetTrace):
-            return area_on_surface(signed_distance(self.problem, trace, state), state)
+            zone = signed_distance(self.problem, self.moduli, trace, state)
+            return area_on_surface(zone, state)
         return area_in_contact(state, trace)[0]
 
     def pressure_field(self, pair: int = 0) -> ng.GridFunction:
@@ -325,7 +326,8 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
     along = float(np.linalg.norm(force))
     if line.contact.direction is not None:
         along = abs(float(force @ np.array(line.contact.direction)))
-    area = area_on_surface(signed_distance(solution.problem, trace, state), state)
+    zone = signed_distance(solution.problem, solution.moduli, trace, state)
+    area = area_on_surface(zone, state)
     if trace.order == 3:
         facet, s = trace.at_nodes(line.segments)
         pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
