@@ -53,9 +53,12 @@ def locate(trace: BoundaryTrace, points: Array) -> Location:
 
     def located(at: Index) -> Location:
         """Elements of the points numbered `at` (j,)."""
-        near = KDTree(points[at]).query_ball_point(middle, radius)
-        element = np.repeat(np.arange(len(middle)), [len(numbers) for numbers in near])
-        point = at[np.concatenate(near).astype(np.intp)]
+        x, r = points[at], radius[:, None]
+        low, high = x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)
+        some = np.flatnonzero(((low <= middle + r) & (middle - r <= high)).all(axis=1))
+        near = KDTree(x).query_ball_point(middle[some], radius[some])
+        element = np.repeat(some, [len(numbers) for numbers in near])
+        point = at[np.concatenate([*near, []]).astype(np.intp)]
         reference = _references(trace, corners[element], points[point], element)
         share = np.column_stack([reference, 1 - reference.sum(axis=1)])
         noise = COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1)
