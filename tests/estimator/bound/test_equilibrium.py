@@ -14,9 +14,8 @@ from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.geometries import rings
-from ngcontact.geometries.region import compound
-from tests.estimator.bound.test_exact import RESIDUAL, settled
-from tests.scenes import rectangle, unmatched_blocks
+from tests.estimator.bound.test_exact import settled
+from tests.scenes import unmatched_blocks
 
 LAW = Elastic(E=1.0, nu=0.3)
 # Of polynomials through values, and of their derivatives, relative to stresses; measured 2e-10.
@@ -170,21 +169,3 @@ def test_a_pin_that_may_turn(order, maxh):
     solution = solve(problem, maxh=maxh, order=order)
     settled(solution)
     assert solution.error_bound < 2 * solution.error_estimate
-
-
-@pytest.mark.parametrize("order", [1, 3])
-@pytest.mark.parametrize("right", [0.42, 0.02, 1e-3])
-def test_sides_beside_vertices(right, order):
-    """An edge lies next to a vertex of the other body: triangles are thin, the stress is one."""
-    problem = Problem(
-        geometry=compound(
-            rectangle("upper", (-0.37, right), (0, 0.5), ("foot", "side", "top", "side")),
-            rectangle("lower", (-1, 1), (-0.7, 0), ("bottom", "wall", "seat", "wall")),
-        ),
-        materials={"upper|lower": LAW},
-        displacement={"bottom": (0, 0), "top": (0, -1e-3)},
-        contact=[Contact("foot", "seat", rows="dual")],
-    )
-    solution = solve(problem, maxh=0.5, order=order)
-    settled(solution)
-    assert solution.equilibrated.certificate["tractions"] <= RESIDUAL

@@ -7,10 +7,9 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Axis, OCCGeometry, WorkPlane, Z
+from netgen.occ import Axis, OCCGeometry, Z
 
 from drivers.reference import cases
-from drivers.reference.overkill import Overkill
 from drivers.reference.straight import energy_error
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.estimator.bound import bound
@@ -70,21 +69,6 @@ def test_a_bound_of_undivided_cells_is_a_warning(monkeypatch):
     assert len(found[1]) > 4 * len(found[0])
 
 
-def half_ellipse(angle=0.0):
-    """Half an ellipse in its bearing, clamped at the cut, under its weight and a thrust."""
-    shape = WorkPlane().Ellipse(1.0, 0.6).Face() * WorkPlane().MoveTo(0, -2).Rectangle(3, 4).Face()
-    for edge in shape.edges:
-        edge.name = "cut" if abs(edge.center.x) < 1e-9 else "rim"
-    shape.faces.name = "half"
-    return Problem(
-        geometry=OCCGeometry(shape.Rotate(Axis((0, 0, 0), Z), angle), dim=2),
-        materials={"half": ONE},
-        displacement={"cut": (0, 0)},
-        sliding="rim",
-        force={"half": (0.3, -1.0)},
-    )
-
-
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_the_bound_of_a_round_guide_grows_with_the_load(bilateral, order):
@@ -100,17 +84,6 @@ def test_the_bound_of_a_round_guide_grows_with_the_load(bilateral, order):
         problem = replace(case, traction={"hole": size * case.traction["hole"]})
         relative.append(solve(problem, maxh=0.3, order=order).relative_error_bound)
     assert relative == pytest.approx([relative[0]] * 3, rel=1e-12)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.study(witness=["2"])
-def test_a_guide_that_is_no_circle(order):
-    *_, fine = adapt(half_ellipse(27.0), order=4, max_dofs=9000)
-    overkill = Overkill(fine)
-    for solution in adapt(half_ellipse(27.0), order=order, max_dofs=1500):
-        settled(solution)
-        error = overkill.relative_error(solution) * fine.energy_norm
-        assert 1 <= solution.error_bound / error <= 2
 
 
 def test_the_bar_of_a_force_beside_a_curved_guide():

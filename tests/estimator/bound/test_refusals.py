@@ -66,14 +66,7 @@ def test_steep_displacements_are_none_that_jump(steep):
 def test_rows_where_nodes_do_not_face_nodes(rows, angle):
     """What nodal ones leave open is lifted, and costs more."""
     mesh = two_blocks(np.linspace(-1, 1, 6), np.linspace(-1, 1, 8), angle)
-    base = cases.pressure_patch().problem
-    pairs = [replace(pair, rows=rows, direction=None) for pair in base.contact]
-    problem = replace(
-        base,
-        geometry=mesh,
-        displacement={"bottom": (0, 0), "top": (0, -0.01)},
-        sliding=None,
-        traction={},
-        contact=pairs,
-    )
+    pair = replace(cases.TOUCHING, rows=rows)
+    down = {"bottom": (0, 0), "top": (0, -0.01)}
+    problem = cases.touching_blocks(down, geometry=mesh, contact=[pair])
     assert solve(problem).relative_error_bound < 1
