@@ -6,9 +6,6 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
-import pytest
-
 from drivers.__main__ import drivers
 from tests.docs.pages import resolved
 
@@ -58,23 +55,6 @@ def rounded(stated, seconds):
         return stated == seconds
     unit = 10 ** (math.floor(math.log10(float(seconds))) - 1)
     return abs(float(stated) - float(seconds)) < 0.501 * unit
-
-
-PAGE = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
-
-
-def test_blocks_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    names: dict = {}
-    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
-        exec(compile(block, "docs/results.md", "exec"), names)
-    assert names["values"].body.tolist() == ["block", "disc"]
-    assert names["picture"].shape == (80, 50)
-    outside = np.isnan(names["picture"])
-    x, y = np.moveaxis(names["grid"], -1, 0)
-    np.testing.assert_array_equal(outside, (y > 0) & (x**2 + (y - 1) ** 2 > 1))
-    below = names["below"]
-    assert below.stress[-1, 1, 1] == pytest.approx(-names["solution"].pressure.max(), rel=0.2)
 
 
 TEXTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])

@@ -17,7 +17,7 @@ BLOCKS = [
     block for path in TEXTS for block in blocks(path.relative_to(ROOT).as_posix(), path.read_text())
 ]
 BY_THE_SITE = ("docs/howto/pandas.md",)  # needs pandas
-BY_OTHER_TESTS = ("README.md", "docs/results.md")  # with their figures
+BY_OTHER_TESTS = ("README.md",)  # with its figures
 SLOW = ("docs/tutorials/own_geometry.md", "docs/howto/two_round_bodies.md")  # by `make studies`
 
 # What a page that is no program of its own takes for granted.

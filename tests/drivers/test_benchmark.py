@@ -3,17 +3,14 @@
 import ast
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import ngcontact
 from drivers.benchmark.engines import NotInstalledError, needed, ngsolve
 from drivers.benchmark.scenes.problems import block, disc
 from drivers.benchmark.studies import overhead, processes
-from ngcontact import adapt
 
 COMMON = {"disc": disc(), "block": block()}
-QUANTITIES = ("force", "peak", "half_width", "energy")
 
 # Relative errors allowed at 1000 unknowns on graded meshes: about twice the largest measured of
 # the active set and the penalty method. The block's force is given by equilibrium.
@@ -41,23 +38,6 @@ def test_engines_of_ngsolve_find_the_references(name: str):
 def test_a_missing_package_is_named():
     with pytest.raises(NotInstalledError, match=r"Nothing needs no_such_code.*bench"):
         needed("Nothing", "math", "no_such_code")
-
-
-@pytest.mark.parametrize("name", COMMON)
-def test_references_are_those_of_the_package(name: str):
-    common = COMMON[name]
-    *_, solution = adapt(common.problem, order=4, max_dofs=20_000)
-    found = {
-        "force": common.parts * solution.force.sum(),
-        "peak": solution.pressure[np.argmin(solution.points[:, 0])],
-        "half_width": solution.transitions()[0, 0],
-        "energy": solution.energy_norm**2 / 2,
-    }
-    # Twice the errors measured at 17 000 and 19 000 unknowns, of which the disc's force and
-    # half-width (2.5e-9, 3.3e-6) and the block's peak and energy (9.3e-7, 2.6e-9) are larger.
-    allowed = {"force": 5e-9, "peak": 2e-6, "half_width": 7e-6, "energy": 6e-9}
-    difference = {q: abs(found[q] / getattr(common.reference, q) - 1) for q in QUANTITIES}
-    assert {q: e for q, e in difference.items() if e > allowed[q]} == {}
 
 
 def test_small_problems_do_not_stay_iterative():

@@ -11,25 +11,8 @@ from PIL import Image
 
 from ngcontact import plot_convergence, write_film, write_series
 from ngcontact.fem import von_mises
-from ngcontact.output.files import check_path, replacing
+from ngcontact.output.files import check_path
 from tests.output.solutions import disc
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
-def test_a_half_written_file_replaces_none(tmp_path, error):
-    old, new = tmp_path / "old.vtu", tmp_path / "new.vtu"
-    old.write_text("old")
-
-    def interrupted():
-        with replacing(old, new) as drafts:
-            for draft in drafts:
-                draft.write_text("half a file")
-            raise error
-
-    with pytest.raises(error):
-        interrupted()
-    assert [file.name for file in tmp_path.iterdir()] == ["old.vtu"]
-    assert old.read_text() == "old"
 
 
 @pytest.mark.parametrize(

@@ -7,31 +7,10 @@ from netgen.occ import OCCGeometry
 from ngsolve.meshes import MakeStructured3DMesh
 
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import disc_on_block
 from ngcontact.geometries.region import body, compound, polygon
-from ngcontact.problem import MeshArrays, bisect
+from ngcontact.problem import MeshArrays
 from ngcontact.problem.checks import _inside
 from tests.scenes import rectangle
-
-
-@pytest.fixture(params=[1, 3], ids=["straight", "curved"])
-def mesh(request):
-    mesh = ng.Mesh(disc_on_block(radius=1.0).GenerateMesh(maxh=0.5))
-    mesh.Curve(request.param)
-    return mesh
-
-
-def test_numbers_are_those_of_ngsolve(mesh):
-    view = MeshArrays(mesh)
-    for vb, vertices, regions in (
-        (ng.VOL, view.elements, view.bodies),
-        (ng.BND, view.facets, view.boundaries),
-    ):
-        elements = list(mesh.Elements(vb))
-        assert vertices.tolist() == [[v.nr for v in el.vertices] for el in elements]
-        assert regions.tolist() == [el.index for el in elements]
-    assert view.vertices.tolist() == [list(v.point) for v in mesh.vertices]
-    assert view.without_simplices() == 0
 
 
 def test_arrays_of_tetrahedra():
@@ -48,18 +27,6 @@ def test_arrays_of_tetrahedra():
     assert not view.pieces.any()
     _, count = np.unique(view.keys(view.sides), return_counts=True)
     assert np.count_nonzero(count == 1) == len(view.facets)
-
-
-def test_only_marked_elements_are_bisected(mesh):
-    """Apart from the closure: far from them nothing changes, nor do earlier marks count."""
-    marked = np.zeros(mesh.ne, dtype=bool)
-    marked[0] = True
-    old = mesh.ne
-    bisect(mesh, marked)
-    once = mesh.ne - old
-    assert 0 < once < old / 2
-    bisect(mesh, np.zeros(mesh.ne, dtype=bool))
-    assert mesh.ne == old + once
 
 
 SOFT = Elastic(E=1.0, nu=0.3)
