@@ -10,7 +10,7 @@ import pytest
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import ContactWarning, adapt, solve, solving
+from ngcontact import ContactWarning, adapt, solving
 from ngcontact.adaptivity import Refinement
 from ngcontact.geometries import disc as quarter_disc
 from ngcontact.geometries import disc_on_block
@@ -156,16 +156,6 @@ def test_a_tolerance_out_of_reach_is_told(guaranteed):
     name = "bound" if guaranteed else "estimate"
     assert f"the {name} is {told:.2e}, more than tolerance=1e-06" in str(warning.message)
     assert warning.filename == __file__
-
-
-def test_the_warm_start_from_another_mesh_and_order():
-    problem = disc()
-    coarse = solve(problem, maxh=0.2, order=1)
-    cold = solve(problem, maxh=0.1, order=3)
-    warm = solve(problem, maxh=0.1, order=3, start=coarse)
-    assert (warm.active == cold.active).all()
-    assert len(warm.steps) < len(cold.steps)
-    assert warm.energy == pytest.approx(cold.energy, rel=1e-12)
 
 
 def small_disc(radius):

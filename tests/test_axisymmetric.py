@@ -12,7 +12,6 @@ from drivers.reference.cases import FIRST, SECOND
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import rings
-from ngcontact.geometries.region import body, compound, polygon
 from tests.estimator.bound.test_exact import settled
 from tests.scenes import divided
 
@@ -98,32 +97,6 @@ def test_uniform_pressure_is_exact(inner, rows, order):
         assert solution.relative_error_estimate < 1e-9
     settled(solution)
     assert solution.relative_error_bound <= 1e-7
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_hydrostatic_pressure_across_a_cone(order):
-    """Uniform stress -p I on a conical line through the axis, normals of the line."""
-    line = [(0.0, -0.2), (1.0, 0.3)]
-    up = [*line, (1.0, 1.0), (0.0, 1.0)]
-    down = [line[0], (0.0, -1.0), (1.0, -1.0), line[1]]
-    names = ["upper_contact", "upper_side", "top", "axis"]
-    upper = body("upper", polygon(up, names))
-    names = ["axis", "bottom", "lower_side", "lower_contact"]
-    lower = body("lower", polygon(down, names))
-    solution = solve(
-        Problem(
-            geometry=compound(upper, lower),
-            materials={"upper|lower": FIRST},
-            displacement={"bottom": (None, 0)},
-            traction={"upper_side|lower_side|top": 1.0},
-            contact=[Contact("upper_contact", "lower_contact")],
-            model="axisymmetric",
-        ),
-        maxh=0.4,
-        order=order,
-    )
-    assert np.abs(solution.pressure - 1).max() < EXACT
-    assert solution.contact_force() == pytest.approx((0, np.pi), rel=EXACT)
 
 
 @pytest.mark.parametrize(("order", "limit"), [(1, 1.5e-2), (2, 6e-4), (3, 5e-5), (4, 5e-6)])

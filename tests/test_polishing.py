@@ -94,18 +94,6 @@ def solved_root():
     return coarse
 
 
-def test_square_root():
-    case = one_transition()
-    polished = polish(solved_root(), digits=8)
-    assert relative_energy_error(polished, case.exact) < 5e-5  # its square is that of the energy
-    assert abs(polished.transitions()[0, 0]) < 1e-6
-    x = polished.points[polished.active, 0]
-    pressure = polished.pressure[polished.active]
-    error = np.abs(pressure - case.exact.pressure(x))
-    assert error[(x < -0.1) & (x > -0.9)].max() < 1e-4  # at vertices of the mesh
-    assert np.median(error) < 1e-5
-
-
 def test_errors_fall_exponentially_with_the_third_root_of_unknowns():
     """On one mesh with its vertex at the end of contact, orders 2 to 8."""
     coarse, case = solved_root(), one_transition()

@@ -9,7 +9,6 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import rings
 from ngcontact.geometries.region import compound
 from tests.scenes import rectangle
 
@@ -23,16 +22,6 @@ LINE = Contact("upper_contact", "lower_contact")
 def two_blocks(displacement=None, **data):
     """Blocks that touch along y = 0; the lower one is clamped, the upper one held along x."""
     return cases.touching_blocks(displacement or {"bottom": (0, 0), "top": (0, None)}, **data)
-
-
-def pressed_disc() -> Problem:
-    return replace(
-        cases.pressed_disc(),
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.02)},
-        sliding=None,  # both bodies have the boundary of that name
-        traction={"side": (0.001, -0.002)},
-        force={"block": (0.0, -0.001), "disc": (0.002, 0.003)},
-    )
 
 
 def stack() -> Problem:
@@ -57,7 +46,6 @@ PROBLEMS = {
     "S9": lambda: cases.ring_in_ring().problem,
     "polygon": lambda: cases.polygonal_patch().problem,
     "B": cases.partly_opening_block,
-    "disc": pressed_disc,
     "stack": stack,
 }
 
@@ -118,13 +106,9 @@ def test_bilateral_pairs_pull():
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_a_guide_on_a_circle_holds_the_exact_normal(order):
     # A quarter of two rings, pressed from the hole against a guided rim.
-    problem = Problem(
-        geometry=rings(quarter=True),
-        materials={"inner": STIFF, "outer": SOFT},
-        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y|rim",
-        traction={"hole": 0.1 * (1 + ng.x)},
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
+    problem = cases.ring_in_ring().problem
+    load = {"hole": 0.1 * (1 + ng.x)}
+    problem = replace(problem, sliding=f"{problem.sliding}|rim", traction=load)
     solution = solve(problem, maxh=0.4, order=order)
     trace = solution.discrete.space.trace
     at = trace.at_nodes(trace.segments("rim"))

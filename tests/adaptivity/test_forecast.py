@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.occ import Axis, OCCGeometry, Rectangle, Z
@@ -112,20 +111,6 @@ def test_estimates_are_as_forecast(monkeypatch, make, order):
     # Measured: 0.95 to 1.08, at the punch, whose corners are worse than supposed, 1.17 to 1.24;
     # where the order rises 0.56 to 1.46.
     assert ratios[1:] == pytest.approx(1, abs=0.5 if order is None else 0.3)
-
-
-def test_unknowns_of_meshes_being_refined():
-    for element, order in (("isoparametric", 3), ("superparametric", 2), ("physical", 1)):
-        problem = cases.ring_in_ring().problem
-        mesh = ng.Mesh(first_mesh(problem, 0.6).ngmesh.Copy())
-        mesh.Curve(2)
-        refining = Refining(problem, mesh)
-        for _ in range(3):
-            refining.bisect(np.arange(refining.mesh.ne) % 5 == 0)
-        finished = refining.finished()
-        predicted = refining.unknowns(order, element)
-        finished.Curve(2)
-        assert predicted == unknowns(finished, order, element)
 
 
 def divided(rounds, marked=None):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import blocks
+from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
 from ngcontact.problem import MeshArrays, move_vertices
 from tests.discrete.test_linear_systems import same
@@ -16,20 +15,16 @@ from tests.discrete.test_linear_systems import same
 # Of other factorisations of one matrix, condition 1e4: two orders of round-off.
 ROUND_OFF = 1e-11
 STEEL = Elastic(E=200.0, nu=0.3)
-PAIR = Contact(secondary="upper_contact", primary="lower_contact")
 
 
 def pressed(load: float = 1.0, **changes: object) -> Problem:
     """Blocks, the upper one held sideways only, under a pressure that grows to the right."""
-    problem = Problem(
-        geometry=blocks(),
-        materials={"upper": STEEL, "lower": STEEL},
-        displacement={"bottom": (0, 0)},
-        sliding="upper_left",
-        traction={"top": load * (1.5 + ng.x)},
-        contact=[PAIR],
-    )
-    return replace(problem, **changes)
+    data = {
+        "materials": {"upper": STEEL, "lower": STEEL},
+        "sliding": "upper_left",
+        "traction": {"top": load * (1.5 + ng.x)},
+    }
+    return replace(cases.touching_blocks({"bottom": (0, 0)}, **data), **changes)
 
 
 E = ng.Parameter(200.0)
@@ -42,7 +37,7 @@ SEQUENCES = {  # what changes, assemblies, factorisations if they do not depend 
     "model": (pressed(), pressed(model="plane stress"), 1, 1),
     "support": (pressed(), pressed(**HELD), 0, 1),
     "guide": (pressed(), pressed(sliding="upper_right"), 0, None),
-    "bilateral": (pressed(), pressed(contact=[replace(PAIR, bilateral=True)]), 0, None),
+    "bilateral": (pressed(), pressed(contact=[replace(cases.TOUCHING, bilateral=True)]), 0, None),
 }
 
 

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import OCCGeometry, Rectangle
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.adaptive_study.runs import uniform
@@ -17,6 +16,8 @@ from drivers.reference.laws import graded, pressed_fibres, stiff_and_soft
 from drivers.reference.straight import energy_error, relative_energy_error
 from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact.estimator import estimate
+from ngcontact.geometries.region import compound
+from tests.scenes import rectangle
 
 SQUARE = MakeStructured2DMesh(quads=False, nx=8, ny=8)
 [BODY] = SQUARE.GetMaterials()
@@ -186,10 +187,8 @@ def test_locking_is_seen(order, n):
     u, v = psi.Diff(y), -psi.Diff(x)
     mu = 1 / (2 * 1.499999)
     force = ng.CF(tuple(-mu * (w.Diff(x).Diff(x) + w.Diff(y).Diff(y)) for w in (u, v)))
-    square = OCCGeometry(Rectangle(1, 1).Face(), dim=2)
-    square.shape.faces.name = "square"
     problem = Problem(
-        geometry=OCCGeometry(square.shape, dim=2),
+        geometry=compound(rectangle("square", (0, 1), (0, 1))),
         materials={"square": law},
         displacement={".*": (0, 0)},
         force={"square": force},

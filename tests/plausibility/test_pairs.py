@@ -11,7 +11,7 @@ from netgen.occ import Axis, OCCGeometry, Pnt, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, rings
+from ngcontact.geometries import blocks, disc_on_disc, rings
 from ngcontact.geometries.region import compound
 from ngcontact.plausibility import refinement_warning
 from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error
@@ -95,10 +95,10 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
 @pytest.mark.parametrize(("unit", "modulus"), [(1.0, 1.0), (1e3, 1e9)])
 def test_a_gap_of_the_wrong_sign_is_told(unit, modulus):
     geometry = blocks(width=2 * unit, height=unit)
-    problem = Problem(
+    problem = cases.touching_blocks(
+        {"top": (0, 0), "bottom": (0, 0)},
         geometry=geometry,
         materials={"upper|lower": Elastic(E=modulus, nu=0.3)},
-        displacement={"top": (0, 0), "bottom": (0, 0)},
         contact=[Contact("upper_contact", "lower_contact", gap=-5 * unit)],
     )
     run = finest(problem, order=2, unknowns=2000)
@@ -299,12 +299,8 @@ def test_estimates_of_solids_that_rise_are_told_with_their_place():
 @pytest.mark.parametrize(("moduli", "told_of"), [((1.0, 1e12), False), ((1e12, 1.0), True)])
 def test_forces_that_round_off_takes_are_told(moduli, told_of):
     """A stiff disc displaced by d: E eps d stands beside forces of d, 2.5 % at 1e12."""
-    problem = Problem(
-        geometry=disc_on_block(radius=1.0),
-        materials={"disc": Elastic(moduli[0], 0.3), "block": Elastic(moduli[1], 0.3)},
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.01)},
-        sliding="axis",
-        contact=[Contact("disc_arc", "block_top", direction=DOWN)],
-    )
+    laws = {"disc": Elastic(moduli[0], 0.3), "block": Elastic(moduli[1], 0.3)}
+    down = {"block_bottom": (0, 0), "disc_top": (0, -0.01)}
+    problem = replace(cases.pressed_disc(), materials=laws, displacement=down)
     found = told(lambda: solve(problem, maxh=0.15, order=2))
     assert any("round-off" in message for message in found) == told_of

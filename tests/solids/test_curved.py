@@ -12,6 +12,7 @@ from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.contact import with_roles
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import ball_on_block, shells
+from tests.scenes import pressed_ball
 from tests.solids.meshes import boxes, named
 
 # Radii 0.5, 1, 1.5, moduli 1 and 3, Poisson's ratios .3 and .2, overlap .01: c1 = .55, c2 = 7 / 19.
@@ -160,14 +161,7 @@ def test_rigid_obstacle(bilateral):
         geometry=mesh,
         materials={"a": Elastic(1.0, 0.3)},
         traction={"a_top": (0, 0, sign)},
-        contact=[
-            Contact(
-                "a_bottom",
-                direction=(0, 0, -1),
-                gap=lambda x, y, z: gap + 0 * x,
-                bilateral=bilateral,
-            )
-        ],
+        contact=[Contact("a_bottom", direction=(0, 0, -1), gap=gap, bilateral=bilateral)],
     )
     solution = solve(problem, order=2)
     assert np.abs(solution.pressure + sign).max() < 1e-10
@@ -215,13 +209,8 @@ def test_pairs_of_faces_that_share_an_edge(order):
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_rays_beside_a_ball_meet_nothing(order):
     """The block is wider than the ball, and secondary: only what lies below the ball faces it."""
-    problem = Problem(
-        geometry=ball_on_block(),
-        materials={"ball": LAWS["inner"], "block": LAWS["outer"]},
-        displacement={"block_bottom": (0, 0, 0), "ball_top": (0, 0, -0.02)},
-        sliding="cut_x|cut_y",
-        contact=[Contact("block_top", "ball_surface", direction=(0, 0, 1), roles="given")],
-    )
+    pair = Contact("block_top", "ball_surface", direction=(0, 0, 1), roles="given")
+    problem = pressed_ball(0.02, geometry=ball_on_block(), contact=[pair])
     solution = solve(problem, order=order)
     line, trace = solution.pairs[0].line, solution.discrete.space.trace
     place = np.zeros((trace.space.ndof, 3))

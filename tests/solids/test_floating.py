@@ -44,19 +44,16 @@ def test_block_that_slides():
 
 @pytest.mark.parametrize(
     ("pull", "words"),
-    [((0.1, 0, -1), r'translation of "upper" along \(1, 0, 0\)'), ((0, 0, 1), "translation")],
+    [
+        ((0.1, 0, -1), r'translation of "upper" along \(1, 0, 0\)'),
+        ((0, 0, 1), "translation"),
+        (ng.CF((-0.1 * ng.y, 0.1 * ng.x, -1)), r"about the axis along \(0, 0, 1\)"),
+    ],
 )
 def test_loads_that_nothing_resists(pull, words):
     with pytest.raises(NoEquilibriumError, match=words) as failure:
         solve(cube_on_block(traction={"upper_top": pull}), order=1)
     assert failure.value.body == "upper"
-
-
-def test_twisting_load():
-    """A moment about the vertical axis, by a function: the motion that it drives is named."""
-    load = ng.CF((-0.1 * ng.y, 0.1 * ng.x, -1))
-    with pytest.raises(NoEquilibriumError, match=r"about the axis along \(0, 0, 1\)"):
-        solve(cube_on_block(traction={"upper_top": load}), order=2)
 
 
 def test_eccentric_load():

@@ -94,18 +94,13 @@ def test_the_algebra_alone(order):
     assert np.abs(found.force - solution.force).max() < 1e-8 * solution.force.max()
 
 
-def hollow(cavity, whole):
-    """A ball of radius 1.5 with a ball of .5 cut out, or a disc of height 1 with a hole drilled."""
-    if cavity:
-        outer, inner = occ.Sphere((0, 0, 0), 1.5), occ.Sphere((0, 0, 0), 0.5)
-    else:
-        outer, inner = (occ.Cylinder((0, 0, 0), occ.Z, r, 1) for r in (1.5, 0.5))
+def hollow(whole):
+    """A ball of radius 1.5 with a ball of .5 cut out, or an octant of it."""
+    outer, inner = occ.Sphere((0, 0, 0), 1.5), occ.Sphere((0, 0, 0), 0.5)
     outer.faces.name, inner.faces.name = "rim", "hole"
-    if not cavity:
-        outer.faces.Min(occ.Z).name, outer.faces.Max(occ.Z).name = "cut_z", "high"
     body = outer - inner
     if not whole:
-        box = occ.Box((0, 0, 0 if cavity else -1), (2, 2, 2))
+        box = occ.Box((0, 0, 0), (2, 2, 2))
         for name, direction in (("cut_x", occ.X), ("cut_y", occ.Y), ("cut_z", occ.Z)):
             box.faces.Min(direction).name = name
         body = body * box
@@ -114,31 +109,26 @@ def hollow(cavity, whole):
     return occ.OCCGeometry(body)
 
 
-def lame(cavity):
+def lame():
     """Stress under the pressure 1 in the hole, radii .5 and 1.5."""
-    a, b, k = 0.5, 1.5, 3 if cavity else 2
-    r2 = ng.x**2 + ng.y**2 + (ng.z**2 if cavity else 0)
-    radial = ng.OuterProduct(*2 * [ng.CF((ng.x, ng.y, ng.z if cavity else 0))]) / r2
-    across = ng.CF((1, 0, 0, 0, 1, 0, 0, 0, int(cavity)), dims=(3, 3)) - radial
-    A, ratio = a**k / (b**k - a**k), (b * b / r2) ** (k / 2)
-    return A * (1 - ratio) * radial + A * (1 + ratio / (k - 1)) * across
+    a, b, r2 = 0.5, 1.5, ng.x**2 + ng.y**2 + ng.z**2
+    radial = ng.OuterProduct(*2 * [ng.CF((ng.x, ng.y, ng.z))]) / r2
+    A, ratio = a**3 / (b**3 - a**3), (b * b / r2) ** 1.5
+    return A * (1 - ratio) * radial + A * (1 + ratio / 2) * (ng.Id(3) - radial)
 
 
-@pytest.mark.parametrize("cavity", [True, False])
 @pytest.mark.parametrize("whole", [True, False])
-def test_pressure_in_a_hole(cavity, whole):
+def test_pressure_in_a_hole(whole):
     """Each guide bears what the pressure exerts across it, and the stress is that of Lame."""
-    guides = [] if whole else ["cut_x", "cut_y"]
-    guides += ["cut_z"] if not (whole and cavity) else []
     problem = Problem(
-        geometry=hollow(cavity, whole),
+        geometry=hollow(whole),
         materials={"body": Elastic(1.0, 0.3)},
-        sliding=guides or None,
+        sliding=None if whole else "cut_x|cut_y|cut_z",
         traction={"hole": 1.0},
     )
     errors, counts = [], []
     for solution in adapt(problem, maxh=0.5, max_dofs=8000 if not whole else 4500):
-        mesh, exact = solution.mesh, lame(cavity)
+        mesh, exact = solution.mesh, lame()
         on_hole = ng.Integrate(-ng.specialcf.normal(3), mesh.Boundaries("hole"), order=6)
         total = np.array(on_hole) + sum(solution.reactions.values(), np.zeros(3))
         assert np.abs(total).max() < 1e-12
