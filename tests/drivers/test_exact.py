@@ -83,7 +83,7 @@ def test_elements_find_the_exact_solution(name):
         (paper.opening_ring, 2, "isoparametric"),
     ],
 )
-@pytest.mark.study(witness=["ring_in_ring-1-physical"])
+@pytest.mark.study(witness=["ring_in_ring-1-isoparametric"])
 def test_as_the_error_against_the_exact_stress(make, order, element):
     case = make()
     *_, finest = adapt(case.problem, order=4, max_dofs=18_000)
