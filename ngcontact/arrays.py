@@ -82,6 +82,14 @@ def joined(records: Sequence[Record]) -> Record:
     return kind(*stack)
 
 
+def places_of(wanted: Index, known: Index) -> Index:
+    """Places (k,) of the numbers `wanted` (k,) among those that are `known` (n,), -1 where none."""
+    every = np.concatenate([known, wanted])
+    _, first, number = np.unique(every, return_index=True, return_inverse=True)
+    place = first[number[len(known) :]]
+    return np.where(place < len(known), place, -1)
+
+
 def paths(links: Index, count: int) -> list[Index]:
     """Each curve of `links` (l, 2), numbers (j,) of points; a closed one ends where it starts."""
     graph = from_triplets(np.ones(len(links)), links[:, 0], links[:, 1], (count, count))

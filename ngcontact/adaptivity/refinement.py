@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, across
+from ..arrays import Array, Index, Mask, across, places_of
 from ..contact import faced_vertices, nodal_line
 from ..fem import BoundaryTrace, boundary_trace, unknowns_of
 from ..mesh import CadEdge, copied
@@ -27,61 +27,18 @@ class RefinementTree:
     element: Index  # (ne,), an element of it for each of the later ones
 
 
-def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
-    """Vertices of the secondary and, at the same C_j, of the primary; `trace` is of degree 1."""
-    if contact.primary is None:
-        return {}
-    line, facing = nodal_line(trace, contact)
-    vertex = faced_vertices(trace, line, facing)
-    met = vertex >= 0
-    return dict(zip(line.node[met].tolist(), vertex[met].tolist(), strict=True))
+def matched_vertices(trace: BoundaryTrace, contact: Contact) -> Index:
+    """Vertices (2, nv) of the primary at the C_j of the secondary's, and the reverse; -1 elsewhere.
 
-
-def _boundary_edges(mesh: ng.Mesh) -> dict[tuple[int, int], int]:
-    """Element at each boundary segment, by its vertices."""
-    view = MeshArrays(mesh)
-    ends = np.sort(view.facets, axis=1).tolist()
-    return {(a, b): el for (a, b), el in zip(ends, view.facet_elements.tolist(), strict=True)}
-
-
-def _children(mesh: ng.Mesh, first: int) -> dict[tuple[int, int], int]:
-    """New vertex on each bisected boundary segment, by the segment's vertices."""
-    ends = MeshArrays(mesh).facets
-    parents = ((v, mesh.GetParentVertices(v)) for v in np.unique(ends[ends >= first]).tolist())
-    return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
-
-
-def _facing_elements(
-    pairs: list[dict[int, int]], segments: dict[tuple[int, int], int], flags: Mask
-) -> list[int]:
-    """Elements at segments that face those of flagged elements: marked late, they cost a round."""
-    found = []
-    for pair in pairs:
-        for here in (pair, {b: a for a, b in pair.items()}):
-            for (a, b), element in segments.items():
-                if a in here and b in here and flags[element]:
-                    facing = min(here[a], here[b]), max(here[a], here[b])
-                    found.extend([segments[facing]] if facing in segments else [])
-    return found
-
-
-def _match_children(
-    pairs: dict[int, int],
-    children: dict[tuple[int, int], int],
-    segments: dict[tuple[int, int], int],
-) -> list[int]:
-    """Add to `pairs` the new vertices on facing segments; elements at segments that lag."""
-    back = {b: a for a, b in pairs.items()}
-    lagging = []
-    for (a, b), child in sorted(children.items(), key=lambda item: item[1]):
-        for here, there in ((pairs, back), (back, pairs)):
-            if a in here and b in here and child not in here:
-                key = (min(here[a], here[b]), max(here[a], here[b]))
-                if key in children:
-                    here[child], there[children[key]] = children[key], child
-                elif key in segments:
-                    lagging.append(segments[key])
-    return lagging
+    `trace` is of degree 1.
+    """
+    partner = np.full((2, trace.mesh.nv), -1)
+    if contact.primary is not None:
+        line, facing = nodal_line(trace, contact)
+        vertex = faced_vertices(trace, line, facing)
+        met = vertex >= 0
+        partner[0, line.node[met]], partner[1, vertex[met]] = vertex[met], line.node[met]
+    return partner
 
 
 def _by_edge(trace: BoundaryTrace, vertices: Index) -> Iterator[tuple[CadEdge, Index]]:
@@ -92,19 +49,16 @@ def _by_edge(trace: BoundaryTrace, vertices: Index) -> Iterator[tuple[CadEdge, I
         yield (trace.edges or [])[number], np.flatnonzero(region[vertices] == number)
 
 
-def _move_to_partners(
-    trace: BoundaryTrace, contact: Contact, matched: dict[int, int], first: int
-) -> None:
-    """Move new pairs of vertices along their exact curves until they face each other.
+def _move_to_partners(trace: BoundaryTrace, contact: Contact, pairs: Index) -> None:
+    """Move pairs (k, 2) of new vertices along their exact curves until they face each other.
 
     Along a fixed direction both go to their mean eta; along normals, across a clearance or an
     overlap, the one of the primary goes to the normal of the other.
     """
-    new = [(a, b) for a, b in matched.items() if a >= first or b >= first]
-    if trace.edges is None or not new:
+    if trace.edges is None or not len(pairs):
         return
     mesh = MeshArrays(trace.mesh)
-    pairs, xy = np.array(new), mesh.vertices
+    xy = mesh.vertices
     if contact.direction is None:
         apart = np.linalg.norm(xy[pairs[:, 0]] - xy[pairs[:, 1]], axis=1)
         pairs = pairs[apart > VERTEX_DISTANCE * mesh.extent]
@@ -153,10 +107,12 @@ class Refining:
         self.problem, self.given = problem, mesh
         self.mesh = copied(mesh)
         self.origin = np.arange(mesh.ne)
-        paired = any(contact.primary is not None for contact in problem.contact)
-        trace = boundary_trace(mesh, 1) if paired else None
-        self._pairs = [matched_vertices(trace, contact) for contact in problem.contact if trace]
-        self._segments = _boundary_edges(self.mesh) if any(self._pairs) else {}
+        self._paired = [contact for contact in problem.contact if contact.primary is not None]
+        # (2 p, nv), of each of p pairs what `matched_vertices` answers
+        self._partner = np.zeros((0, mesh.nv), dtype=np.intp)
+        if self._paired:
+            trace = boundary_trace(mesh, 1)
+            self._partner = np.concatenate([matched_vertices(trace, one) for one in self._paired])
         self._first = mesh.nv
         self._characteristic = mesh.nv - mesh.nedge + mesh.ne
         self._curved = mesh.GetCurveOrder() > 1
@@ -168,23 +124,44 @@ class Refining:
         extra = now.GetNE(ng.BND) if element == "physical" and self._curved else 0
         return unknowns_of(order, now.nv + extra, edges, now.ne)
 
+    def _facing(self, ends: Index, among: Index) -> Index:
+        """Numbers (2 p, k) of pairs of vertices `among` (n, 2) that face `ends` (k, 2), or -1."""
+        keys, there = MeshArrays(self.mesh).keys, self._partner[:, ends]
+        found = places_of(keys(there).ravel(), keys(among)).reshape(there.shape[:2])
+        return np.where((there >= 0).all(axis=2), found, -1)
+
+    def _elements_facing(self, ends: Index) -> Index:
+        """Elements (j,) at segments that face those with the `ends` (k, 2)."""
+        view = MeshArrays(self.mesh)
+        facing = self._facing(ends, view.facets)
+        return view.facet_elements[facing[facing >= 0]]
+
+    def _match(self) -> Index:
+        """Match the vertices made since on facing segments; elements (j,) at segments that lag."""
+        made = MeshArrays(self.mesh).facets
+        made = np.unique(made[made >= self._first])
+        parents = np.array([self.mesh.GetParentVertices(v) for v in made.tolist()]).reshape(-1, 2)
+        more = self.mesh.nv - self._partner.shape[1]
+        self._partner = np.pad(self._partner, ((0, 0), (0, more)), constant_values=-1)
+        while True:  # those on halves of segments once the middles are matched
+            facing = self._facing(parents, parents)
+            partner = np.where(facing >= 0, made[facing], -1)
+            if np.array_equal(self._partner[:, made], partner):
+                return self._elements_facing(parents)
+            self._partner[:, made] = partner
+
     def bisect(self, marked: Mask) -> Index:
         """Refine the elements `marked` (ne,), and what keeps contact lines matched.
 
         Returns the element (k,) of which each of the k elements is a part, by its former number.
         """
-        flags, count = np.array(marked), self.mesh.ne
-        matched = any(self._pairs)
-        if matched:
-            flags[_facing_elements(self._pairs, self._segments, flags)] = True
+        flags, view = np.array(marked), MeshArrays(self.mesh)
+        count, matched = self.mesh.ne, (self._partner >= 0).any()
+        if matched:  # marked late, they cost a round
+            flags[self._elements_facing(view.facets[flags[view.facet_elements]])] = True
         for _ in range(MATCHING_ROUNDS):
             bisect(self.mesh, flags)
-            if not matched:
-                break
-            self._segments, children = _boundary_edges(self.mesh), _children(self.mesh, self._first)
-            matching = (_match_children(pair, children, self._segments) for pair in self._pairs)
-            lagging = [element for elements in matching for element in elements]
-            if not lagging:
+            if not matched or not len(lagging := self._match()):
                 break
             flags = np.zeros(self.mesh.ne, dtype=bool)
             flags[lagging] = True
@@ -198,10 +175,11 @@ class Refining:
 
     def finished(self) -> ng.Mesh:
         """The mesh, to be curved by the caller, with new nodes moved along curves to common C_j."""
-        if any(self._pairs):
+        if (self._partner >= 0).any():
             trace = boundary_trace(self.mesh, 1)
-            for contact, pair in zip(self.problem.contact, self._pairs, strict=True):
-                _move_to_partners(trace, contact, pair, self._first)
+            for contact, partner in zip(self._paired, self._partner[::2], strict=True):
+                pairs = np.column_stack([np.arange(len(partner)), partner])[partner >= 0]
+                _move_to_partners(trace, contact, pairs[(pairs >= self._first).any(axis=1)])
         return copied(self.mesh)  # numbers only the edges that are left
 
 

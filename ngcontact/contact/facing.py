@@ -1,8 +1,8 @@
 """What faces a secondary: directions, points opposite to points, pieces of segments that face.
 
 In the plane rays meet curves and segments are divided where they pass vertices of the primary
-(`contact.projection`); in space rays meet surfaces (`contact.casting`) and facets are clipped
-(`contact.clipping`). All else is the same.
+(`contact.projection`); in space rays meet surfaces and facets are clipped (`contact.surfaces`). All
+else is the same.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask, across, joined, rows_of
+from ..arrays import Array, Index, Mask, across, joined, places_of, rows_of
 from ..fem import BoundaryTrace
 from ..lagrange import at
 from ..problem import Contact
 from ..reference import triangle
-from . import casting, clipping, projection
+from . import projection, surfaces
 from .line import ContactLine
 from .projection import MATCHING_DISTANCE, NEWTON_TOLERANCE, Partners, coincident, none_met
 
@@ -77,7 +77,7 @@ def partners(
     rest = np.flatnonzero(found.segment < 0)
     if rest.size:
         x, d = points[rest], directions[rest]
-        cast = projection.cast if trace.model.dim == 2 else casting.cast
+        cast = projection.cast if trace.model.dim == 2 else surfaces.cast
         other = cast(x, d, trace.curve[facing], trace.side[facing])
         # Overlap puts a partner behind the point, inside the own body; one that the backward ray
         # meets only after it has left that body belongs to a far side.
@@ -124,7 +124,7 @@ def opposite(
     meet: the distance is NaN, the parameter that of `near`.
     """
     if trace.model.dim == 3:
-        there, distance = casting.onto(points, directions, trace.curve, facing, near)
+        there, distance = surfaces.onto(points, directions, trace.curve, facing, near)
         lost = ~np.isfinite(np.column_stack([there, distance])).all(axis=1)
         there[lost], distance[lost] = near[lost], np.nan
         return there, distance
@@ -220,7 +220,7 @@ def _clipped(
     corners, (other, part) = trace.curve[facets[faces]][:, :3], _outlines(trace, facing)
     outward = trace.side[facing[part], None, None] > 0
     other = np.where(outward, other, other[:, ::-1])  # anticlockwise from outside
-    local, parts, number = clipping.pieces(corners, d[faces], other, far[faces])
+    local, parts, number = surfaces.pieces(corners, d[faces], other, far[faces])
     number = part[number]
     start, share = np.tile(triangle.CENTRE, (len(local), 1)), np.abs(np.linalg.det(parts))
     pieces = FacingPieces(faces[local], parts, facing[number], start, share)
@@ -301,10 +301,8 @@ def opposite_segments(
         distance, near = cKDTree(x[there]).query(x[own])
         close = distance <= MATCHING_DISTANCE * trace.lengths(line.segments[local])
         vertices[alone] = np.where(close, there[near], -1)
-    keys, wanted = trace.arrays.keys(sides), trace.arrays.keys(vertices)
-    order = np.argsort(keys)
-    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-    same = (vertices >= 0).all(axis=1) & (keys[found] == wanted)
+    found = places_of(trace.arrays.keys(vertices), trace.arrays.keys(sides))
+    same = (vertices >= 0).all(axis=1) & (found >= 0)
     return np.where(same, line.facing[found], -1)
 
 
