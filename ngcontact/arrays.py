@@ -84,10 +84,9 @@ def joined(records: Sequence[Record]) -> Record:
 
 def places_of(wanted: Index, known: Index) -> Index:
     """Places (k,) of the numbers `wanted` (k,) among those that are `known` (n,), -1 where none."""
-    every = np.concatenate([known, wanted])
-    _, first, number = np.unique(every, return_index=True, return_inverse=True)
-    place = first[number[len(known) :]]
-    return np.where(place < len(known), place, -1)
+    order = np.argsort(known)
+    found = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(known) - 1)]
+    return np.where(known[found] == wanted, found, -1)
 
 
 def paths(links: Index, count: int) -> list[Index]:

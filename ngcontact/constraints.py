@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from .arrays import Array, Columns, Index, Mask, dense, from_triplets, rows_of
+from .arrays import Array, Columns, Index, Mask, dense, from_triplets
 
 ROW_DIFFERENCE = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 SOFT_CONDITION = 1e2  # condition number of rows up to which softer bodies in front host them
@@ -104,22 +104,10 @@ class Rows:
         np.add.at(result, e.row, np.einsum("ki,ikr->kr", e.coefficient, at))
         return result
 
-    def select(self, rows: Index) -> Rows:
-        """Some of the rows, by their numbers `rows` (k,)."""
-        if np.array_equal(rows, np.arange(len(self.node))):
-            return self
-        return rows_of(self, rows)
-
     def alike(self, first: int, second: int) -> bool:
         """Whether two rows have the same left side."""
         difference = self.matrix[[first]] - self.matrix[[second]]
         return bool(np.abs(difference.data).max(initial=0.0) <= ROW_DIFFERENCE)
-
-
-def no_rows(n: int, d: int = 2) -> Rows:
-    """The rows of a problem without contact on n nodes."""
-    none = np.zeros(0, dtype=np.intp)
-    return Rows(none, np.zeros((0, d)), sp.csr_array((0, n)), np.zeros(0), none > 0)
 
 
 class Links(NamedTuple):

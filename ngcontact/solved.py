@@ -83,10 +83,8 @@ class Solved:
     @cached_property
     def pairs(self) -> list[ContactState]:
         """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
-        program = self.discrete.program
-        gap = program.g - self.minimiser.u[program.unknown]  # (3.9), (3.9')
         lines = self.discrete.lines
-        parts = by_line(lines, gap), by_line(lines, self.force), by_line(lines, self.active)
+        parts = by_line(lines, self.gap), by_line(lines, self.force), by_line(lines, self.active)
         return [ContactState(*of_line) for of_line in zip(lines, *parts, strict=True)]
 
     @cached_property
@@ -124,7 +122,8 @@ class Solved:
     @cached_property
     def gap(self) -> Array:
         """Gap (m,) after deformation along each point's direction, a length; >= 0 to round-off."""
-        return np.concatenate([np.zeros(0), *(pair.gap for pair in self.pairs)])
+        program = self.discrete.program
+        return program.g - self.minimiser.u[program.unknown]  # (3.9), (3.9')
 
     @property
     def force(self) -> Array:

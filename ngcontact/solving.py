@@ -30,7 +30,6 @@ from .discrete import (
     carried_active_set,
     discretise,
     first_active_set,
-    hardly_held,
     minimise_energy,
 )
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
@@ -189,7 +188,10 @@ def solve_on(
     same = start is not None and (start.mesh, start.order, start.element) == here
     tried: list[DiscreteProblem] = []
 
-    def attempt(problem: Problem, known: DiscreteProblem | None) -> Solution:
+    def attempt(
+        problem: Problem, known: DiscreteProblem | None
+    ) -> tuple[Solution, ContactError | None]:
+        """The solution, and the error of a body that contact hardly holds."""
         discrete = discretise(problem, *here, known)
         tried.append(discrete)
         if start is None:
@@ -200,12 +202,13 @@ def solve_on(
         tree = RefinementTree(mesh, np.arange(mesh.ne))
         solution = made_of(Solution, minimiser, tried, element, curved, tree=tree)
         solution.work["evaluations"] = evaluations() - before
-        return solution
+        if discrete.rigid is None:
+            return solution, None
+        return solution, discrete.rigid.hardly_held(discrete.basis.T @ minimiser.u)
 
-    first = None
+    first, doubt = None, None
     try:
-        first = attempt(problem, start.discrete if start is not None and same else None)
-        doubt: ContactError | None = hardly_held(first.discrete, first.minimiser)
+        first, doubt = attempt(problem, start.discrete if start is not None and same else None)
         if doubt is None:
             return first
     except (ConvergenceError, NoEquilibriumError) as error:
@@ -218,10 +221,10 @@ def solve_on(
         raise doubt
     pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
     try:
-        second = attempt(replace(problem, contact=pairs), tried[0] if tried else None)
+        second, again = attempt(replace(problem, contact=pairs), tried[0] if tried else None)
     except (ContactError, ValueError):
         raise doubt from None
-    if hardly_held(second.discrete, second.minimiser) is None:
+    if again is None:
         names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in exchanged.values())
         secondaries = ", ".join(f'"{c.secondary}"' for c in exchanged.values())
         warn(

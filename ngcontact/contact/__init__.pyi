@@ -18,7 +18,6 @@ from .facing import rays as rays
 from .line import ContactLine as ContactLine
 from .line import by_line as by_line
 from .line import in_contact as in_contact
-from .line import links as links
 from .line import neighbours as neighbours
 from .line import twins as twins
 from .line import without as without
@@ -28,7 +27,5 @@ from .nodal import prescribed_gap as prescribed_gap
 from .nodal import with_roles as with_roles
 from .search import find_contacts as find_contacts
 from .state import ContactState as ContactState
-from .state import Transitions as Transitions
 from .state import ending_segments as ending_segments
 from .state import state_of as state_of
-from .state import transitions_on as transitions_on

@@ -243,8 +243,6 @@ def with_dual_rows(
     of both signs. The psi of these nodes are added to those of nodes beside, so that the sum of all
     stays 1, as at the ends of interfaces in mortar methods.
     """
-    if len(line.facing) == 0:
-        return line, facing
     contact, m = line.contact, len(facing)
     matched = (opposite_segments(trace, line, facing) >= 0) & (contact.rows != "dual")
     if matched.all():

@@ -111,12 +111,6 @@ def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
     return [values[first:last] for first, last in pairwise(stops)]
 
 
-def links(line: ContactLine) -> Index:
-    """Pairs (l, 2) of contact points beside each other on one segment of a plane line."""
-    pairs = np.stack([line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()], axis=1)
-    return pairs[(pairs >= 0).all(axis=1)]
-
-
 def neighbours(line: ContactLine) -> Index:
     """Pairs (l, 2) of contact points along a plane line, over nodes without one, and of corners."""
     segment, place = np.nonzero(line.rows >= 0)

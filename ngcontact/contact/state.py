@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask, distances_along
 from ..fem import ORDERS, Model
-from .line import ContactLine, in_contact, links, twins
+from .line import ContactLine, in_contact, neighbours
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -23,12 +23,12 @@ FIT_SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
 
 
 def _run_of_points(
-    start: int, before: int, neighbours: dict[int, list[int]], active: Mask
+    start: int, before: int, beside: dict[int, list[int]], active: Mask
 ) -> list[int]:
     """Points from `start` on, away from `before`, as long as they share the state of `start`."""
     run, last = [start], before
     while True:
-        onward = [i for i in neighbours[run[-1]] if i != last]
+        onward = [i for i in beside[run[-1]] if i != last]
         if not onward or active[onward[0]] != active[start] or onward[0] in run:
             return run
         last = run[-1]
@@ -75,11 +75,11 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     Between the two points at a corner it is the corner. The `gap` (m,) is that after deformation,
     points in contact are `active` (m,).
     """
-    neighbours: dict[int, list[int]] = defaultdict(list)
-    linked = np.concatenate([links(line), twins(line)])  # at a corner without a distance
+    beside: dict[int, list[int]] = defaultdict(list)
+    linked = neighbours(line)
     for a, b in linked.tolist():
-        neighbours[a].append(b)
-        neighbours[b].append(a)
+        beside[a].append(b)
+        beside[b].append(a)
     active = in_contact(line, active)
     x, order = line.position, line.rows.shape[1] - 1
     ends, found, beyond = [], [], []
@@ -87,8 +87,8 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     outwards: list[Index] = []
     for link in linked[active[linked[:, 0]] != active[linked[:, 1]]].tolist():
         inner, outer = sorted(link, key=lambda i: not active[i])
-        opened = _run_of_points(outer, inner, neighbours, active)
-        closed = _run_of_points(inner, outer, neighbours, active)
+        opened = _run_of_points(outer, inner, beside, active)
+        closed = _run_of_points(inner, outer, beside, active)
         inwards.append(np.array(closed))
         outwards.append(np.array(opened))
         if line.node[inner] == line.node[outer]:  # the node touches one side of a corner only
@@ -96,7 +96,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
             found.append(x[inner])
             beyond.append(0.0)
             continue
-        if len(opened) > 1 and any(active[i] for i in neighbours[opened[-1]]):
+        if len(opened) > 1 and any(active[i] for i in beside[opened[-1]]):
             opened = opened[: (len(opened) + 1) // 2]  # its other end uses the other half
         distance = distances_along(x[[inner, *opened]])[1:]
         if order > ORDERS[-1]:  # of `polish`: a vertex of the mesh lies there

@@ -190,6 +190,7 @@ def clipped(polygon: Array) -> tuple[Array, Index]:
     Corners (r, 7, 3) of convex polygons from the apex on, of which the first (r,) count.
     """
     number, count = np.arange(MOST_CORNERS), np.full(len(polygon), 3)
+    twice = len(polygon), 2 * MOST_CORNERS
     corners = np.pad(polygon, ((0, 0), (0, MOST_CORNERS - 3), (0, 0)))
     for i in range(3):  # L_i >= 0
         corners[np.abs(corners[:, :, i]) < ON_EDGE, i] = 0.0
@@ -199,8 +200,8 @@ def clipped(polygon: Array) -> tuple[Array, Index]:
         a, b = last[:, :, i], corners[:, :, i]
         crossed = some & ((a >= 0) != (b >= 0))
         t = np.divide(a, a - b, out=np.zeros_like(a), where=crossed)[:, :, None]
-        cut = np.stack([last + t * (corners - last), corners], axis=2).reshape(len(count), -1, 3)
-        kept = np.stack([crossed, some & (b >= 0)], axis=2).reshape(len(count), -1)
+        cut = np.stack([last + t * (corners - last), corners], axis=2).reshape(*twice, 3)
+        kept = np.stack([crossed, some & (b >= 0)], axis=2).reshape(twice)
         first = np.argsort(~kept, axis=1, kind="stable")[:, :MOST_CORNERS]
         corners, count = np.take_along_axis(cut, first[:, :, None], axis=1), kept.sum(axis=1)
     along = np.where(number < count[:, None], corners @ APEX_DIRECTION, -np.inf)

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask, from_triplets, joined, rows_of
-from ..constraints import BasisTransformation, Conditions, Rows, change_of_basis, no_rows
+from ..constraints import BasisTransformation, Conditions, Rows, change_of_basis
 from ..contact import ContactLine, by_line, without
 from ..fem import BoundaryTrace, Space
 from ..problem import Problem, boundary_mask
@@ -105,7 +106,8 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
 def contact_rows(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order, on the nodes of the trace's space."""
     if not lines:
-        return no_rows(trace.space.ndof, trace.model.dim)
+        none, coupling = np.zeros(0, dtype=np.intp), sp.csr_array((0, trace.space.ndof))
+        return Rows(none, np.zeros((0, trace.model.dim)), coupling, np.zeros(0), none > 0)
     return joined(
         [
             Rows(
@@ -176,9 +178,8 @@ def _own_weights(lines: list[ContactLine], number: Index, weight: Array) -> Arra
 
 def _share_primary(one: ContactLine, other: ContactLine) -> bool:
     """Whether two lines face segments in common, or an obstacle both."""
-    if len(one.facing) == 0 or len(other.facing) == 0:
-        return len(one.facing) == len(other.facing)
-    return bool(np.intersect1d(one.facing, other.facing).size)
+    both_rigid = len(one.facing) == len(other.facing) == 0
+    return both_rigid or bool(np.intersect1d(one.facing, other.facing).size)
 
 
 def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Rows]:
@@ -213,7 +214,7 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
         taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *earlier]))
         left = (line.rows >= 0).any(axis=1) | ~had | ~taken
         kept.append(rows_of(line, left, *line.by_segment))
-    return kept, replace(rows, g=g, equality=equality).select(first)
+    return kept, rows_of(replace(rows, g=g, equality=equality), first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,4 +249,6 @@ def admissible_set(
     basis = change_of_basis(conditions, rows, length, stiffness)
     if space.inner.any():  # of these nothing is left in the matrix
         basis = replace(basis, fixed=basis.fixed | space.inner)
-    return AdmissibleSet(kept_lines(lines, basis.kept), rows.select(basis.kept), basis)
+    if len(basis.kept) < len(rows.node):  # the others are prescribed
+        lines, rows = kept_lines(lines, basis.kept), rows_of(rows, basis.kept)
+    return AdmissibleSet(lines, rows, basis)

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Mask, from_triplets
 from ..constraints import BasisTransformation, Conditions, Rows, held_rows
 from ..contact import ContactLine, ContactState, by_line, contact_line, for_partial_cover
-from ..errors import ConvergenceError, NoEquilibriumError
+from ..errors import ConvergenceError
 from ..fem import BoundaryTrace, Space, assemble, boundary_trace, model_of
 from ..linalg import (
     COARSEST,
@@ -321,14 +321,12 @@ def reassembled(
     """A discrete problem of a space that is assembled again and of arrays that were kept.
 
     `program` has the fields of its quadratic program but the matrix, `arrays` all other fields but
-    the linear systems, `rigid` without its space.
+    the linear systems.
     """
-    basis, rigid = arrays["basis"], arrays["rigid"]
-    K, matrix = congruent(space.form.mat, space.basis @ basis.T)
+    K, matrix = congruent(space.form.mat, space.basis @ arrays["basis"].T)
     again = QuadraticProgram(K=K, **program)
-    systems = linear_systems(again, matrix, space, basis)
-    kept = arrays | {"rigid": rigid and rigid.on(space)}
-    return DiscreteProblem(problem=problem, space=space, program=again, systems=systems, **kept)
+    systems = linear_systems(again, matrix, space, arrays["basis"])
+    return DiscreteProblem(problem=problem, space=space, program=again, systems=systems, **arrays)
 
 
 def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
@@ -355,13 +353,6 @@ def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
     result = _placed(p, rigid, result)
     result.u[p.unknown[result.active]] = p.g[result.active]
     return result
-
-
-def hardly_held(discrete: DiscreteProblem, found: Iterate) -> NoEquilibriumError | None:
-    """The error of a body that contact hardly holds, None without one; see `Rigid`."""
-    if discrete.rigid is None:
-        return None
-    return discrete.rigid.hardly_held(discrete.basis.T @ found.u)
 
 
 def _placed(p: QuadraticProgram, rigid: Rigid, iterate: Iterate) -> Iterate:
@@ -413,9 +404,7 @@ def _nearest(new: ContactLine, old: ContactState) -> Mask:
 
 def _carried(new: ContactLine, old: ContactState) -> Mask:
     """First active points of one pair, (m,)."""
-    known = old.line
-    if known.node.size == 0 or new.node.size == 0:
-        return np.zeros(new.node.size, dtype=bool)
+    known = old.line  # with points, as it has forces
     # Two points at a corner are distinguished by their directions.
     size = CORNER_DISTANCE * np.ptp(known.position, axis=0).max(initial=0.0)
     tree = cKDTree(np.column_stack([known.position, size * known.direction]))
@@ -426,7 +415,9 @@ def _carried(new: ContactLine, old: ContactState) -> Mask:
     tied = distance[:, 1] <= (1 + DISTANCE_ROUND_OFF) * away
     active: Mask = old.active[nearest] | (tied & old.active[near[:, 1]])
     order, ends = known.rows.shape[1] - 1, old.transitions if known.dim == 2 else None
-    if order > 1 and ends is not None and len(ends.inner) and away.max() > size:  # other points
+    if (
+        order > 1 and ends is not None and len(ends.inner) and away.max(initial=0.0) > size
+    ):  # other points
         around = np.isin(nearest, [ends.inner, ends.outer])
         end = cKDTree(ends.position).query(new.position)[1]  # the nearest one tells
         inwards = (known.position[ends.inner] - known.position[ends.outer])[end]

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -22,7 +22,7 @@ from scipy.optimize import linprog, nnls
 from ..arrays import Array, Columns, Index, Mask, across, dense, rotations
 from ..constraints import BasisTransformation, Conditions, Rows
 from ..errors import NoEquilibriumError
-from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
+from ..fem import Bodies, BoundaryTrace, Space, body_of_unknown, connected_bodies, model_of
 from ..linalg import shared
 from ..problem import Problem, numbers, region_mask
 from ..qp import NULL_SPACE_TOLERANCE, NullSpace, pinned_null_space, vanishing_combinations
@@ -39,6 +39,9 @@ FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave
 MIN_RESISTANCE = 1e-2  # change of gaps by a unit motion, below which contact hardly resists it
 SPREAD_SHARE = 1e-6  # of the force of a point that those beside it on its segments have at least
 WORK_ROUND_OFF = 1e-14  # work, relative to the most that the load could do, that is none
+
+# Of work (r,) what contact forces (m,) cannot balance, and these.
+Balance: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +102,12 @@ def _described(x: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """The r rigid motions that supports leave free, as functions of V_h."""
+    """The r rigid motions that supports leave free."""
 
-    space: Space  # V_h
     bodies: Bodies  # what moves
     # (m * b, r), of the translations and rotations, m = 3 or 6 in space, of each of b bodies
     combinations: Array
     nodal: Columns  # (d * n, r) node values, lengths; sparse of several bodies
-    values: Columns  # (d * N, r) unknowns of V_h
 
     @property
     def of_bodies(self) -> Array:
@@ -118,21 +119,6 @@ class FreeMotions:
         """Names of the bodies that can move."""
         both = zip(self.bodies.names, self.of_bodies, strict=True)
         return [name for name, part in both if part.any()]
-
-    @cached_property
-    def means(self) -> Columns:
-        """Integrals (d * N, r) of v.z over the boundaries for the motions z, made on first use."""
-        V, model = self.space.V, self.space.trace.model
-        mass = ng.BilinearForm(V)
-        u, v = V.TnT()
-        mass += model.weighted(u.Trace() * v.Trace()) * ng.ds
-        mass.Assemble()
-        return shared(mass.mat) @ self.values
-
-    @cached_property
-    def gram(self) -> Array:
-        """Integrals (r, r) of the products of the motions over the boundaries."""
-        return dense(self.values.T @ self.means)
 
     def motion(self, amounts: Array, multiplier: float = 0.0) -> RigidMotion:
         """One of the motions, by its `amounts` (r,)."""
@@ -152,10 +138,11 @@ class FreeMotions:
 
 def free_motions(
     space: Space, conditions: Conditions, motions: Sequence[bool]
-) -> FreeMotions | None:
+) -> tuple[FreeMotions, Columns] | None:
     """The rigid motions that the supports `conditions` leave free, None if there are none.
 
-    Of those that are rigid in the model: `motions` (m,), see `Model`.
+    And their unknowns (d * N, r) in V_h. Of those that are rigid in the model: `motions` (m,), see
+    `Model`.
 
     Raises
     ------
@@ -190,7 +177,7 @@ def free_motions(
                 "curved superparametric elements do not contain the rotation of a body that its "
                 'supports leave free; use element="isoparametric"'
             )
-    return FreeMotions(space, bodies, combinations, nodal, values)
+    return FreeMotions(bodies, combinations, nodal), values
 
 
 def _by_body(own: Array, body: Index, combinations: Array) -> Columns:
@@ -236,6 +223,7 @@ class Rigid:
     """The r rigid motions that supports leave free, the load and the contact rows on them."""
 
     free: FreeMotions
+    gram: Array  # (r, r) integrals of their products over the boundaries of the bodies
     rows: Array  # (m, r) left sides of the contact rows, lengths
     work: Array  # (r,) of the load, before what quadrature left of it was taken out
     motions: Columns  # (d * n, r) in the unknowns of the program
@@ -246,7 +234,7 @@ class Rigid:
     def left_free(self, active: Mask) -> list[RigidMotion]:
         """Motions that the rows `active` (m,) do not resist either, Remark 3.7."""
         found, free = vanishing_combinations(self.rows[active]).T, self.free
-        return [free.motion(x, float(x @ self.work / (x @ free.gram @ x))) for x in found]
+        return [free.motion(x, float(x @ self.work / (x @ self.gram @ x))) for x in found]
 
     def hardly_held(self, values: Array) -> NoEquilibriumError | None:
         """The error of a large motion that hardly changes any gap, None without one.
@@ -274,10 +262,6 @@ class Rigid:
                 )
         return None
 
-    def on(self, space: Space | None) -> Rigid:
-        """The same as functions of an equal space; None drops the space, to be kept without one."""
-        return replace(self, free=replace(self.free, space=space))  # type: ignore[arg-type]
-
 
 def equilibrium(
     problem: Problem,
@@ -298,36 +282,48 @@ def equilibrium(
         The load does work on a rigid motion that supports and contact admit, or needs contact
         forces at single points.
     """
-    free = free_motions(space, conditions, model_of(problem).motions)
-    if free is None:
+    found = free_motions(space, conditions, model_of(problem).motions)
+    if found is None:
         return None, space.f
-    f, work, of_rows = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
-    left_sides, terms = dense(of_rows), abs(free.values).T @ np.abs(f)
+    free, values = found
+    f, work, of_rows = space.f, values.T @ space.f, rows.left_sides(free.nodal)
+    left_sides, terms = dense(of_rows), abs(values).T @ np.abs(f)
     # If all of the load on a body acted along its motions, each of which moves one body:
     of_body = np.bincount(body_of_unknown(space, free.bodies), np.abs(f))
-    most = _largest(free.values) * of_body[free.of_bodies.any(axis=1).argmax(axis=0)]
+    most = _largest(values) * of_body[free.of_bodies.any(axis=1).argmax(axis=0)]
     noise = np.where(np.abs(work) <= WORK_ROUND_OFF * most, work, 0.0)
-    left, forces = _unbalanced(left_sides, rows.equality, work - noise)
+    balance = partial(_unbalanced, left_sides, rows.equality)
+    left, forces = balance(work - noise)
     if not _is_within(left, forces, WORK_NOISE * terms):
-        _check_work(problem, free, left_sides, rows.equality, work - noise, WORK_NOISE * terms)
+        _check_work(problem, space, free, balance, work - noise, WORK_NOISE * terms)
     left = left + noise
     unresisted, size = vanishing_combinations(left_sides), np.abs(forces)
     if np.sum(size > SPREAD_SHARE * size.max(initial=0.0)) < len(work) - unresisted.shape[1]:
         spread = left_sides + SPREAD_SHARE * around(left_sides)
-        found = _unbalanced(spread, rows.equality, work - left)
-        if not _is_within(*found, np.zeros_like(work)):
-            motion = _motion_of(found[0])
-            raise _concentrated(free, rows.node, left_sides @ motion, motion, size)
+        idle, forces = _unbalanced(spread, rows.equality, work - left)
+        if not _is_within(idle, forces, np.zeros_like(work)):
+            raise _concentrated(space.trace, free, rows.node, left_sides, idle, size)
+    # Integrals of v.z over the boundaries for the motions z; any product serves motions that rows
+    # resist, if no work is left.
+    means = _boundary_mass(space) @ values if left.any() or unresisted.size else values
+    gram = dense(values.T @ means)
     if left.any():  # Remark 3.7: without it the energy has no minimiser
-        f = f - free.means @ np.linalg.solve(free.gram, left)
+        f = f - means @ np.linalg.solve(gram, left)
     placing, carries = _placing(left_sides, unresisted, work - left, rows.g, rows.equality)
     motions = basis.coordinates(free.nodal, of_rows)
-    means = np.zeros((motions.shape[0], 0))
-    if unresisted.size:  # the mean of such a motion over the boundary of the bodies vanishes
-        means = basis.T.T @ (space.basis.T @ (free.means @ unresisted))
+    vanishing = np.zeros((motions.shape[0], 0))
+    if unresisted.size:  # the mean of such a motion over the boundary of the bodies
+        vanishing = basis.T.T @ (space.basis.T @ (means @ unresisted))
     at = basis.unknown, basis.fixed
-    null_space = pinned_null_space(motions, unresisted, means.T, *at, ROW_SHARE)
-    return Rigid(free, left_sides, work, motions, null_space, placing, carries), f
+    null_space = pinned_null_space(motions, unresisted, vanishing.T, *at, ROW_SHARE)
+    return Rigid(free, gram, left_sides, work, motions, null_space, placing, carries), f
+
+
+def _boundary_mass(space: Space) -> sp.csr_array:
+    """Integrals (d * N, d * N) of u.v over the boundaries of all bodies."""
+    mass, (u, v) = ng.BilinearForm(space.V), space.V.TnT()
+    mass += space.trace.model.weighted(u.Trace() * v.Trace()) * ng.ds
+    return shared(mass.Assemble().mat)
 
 
 def _placing(
@@ -379,14 +375,16 @@ def _is_within(left: Array, forces: Array, error: Array, beside: float = 0.0) ->
 
 
 def _concentrated(
-    free: FreeMotions, node: Index, opening: Array, motion: Array, forces: Array
+    trace: BoundaryTrace, free: FreeMotions, node: Index, rows: Array, idle: Array, forces: Array
 ) -> NoEquilibriumError:
     """The error of a load through an end of contact, whose `forces` (m,) cannot be spread.
 
-    Their energy is infinite: at a point of the plane, in space along an edge. By a `motion` (r,)
-    that rows at nodes `node` (m,) do not resist contact opens, by `opening` (m,), elsewhere.
+    Their energy is infinite: at a point of the plane, in space along an edge. Of work `idle` (r,)
+    spread forces leave so much; by that motion contact opens, at nodes `node` (m,) as their `rows`
+    (m, r) say, but for those.
     """
-    opening, trace, words = np.abs(opening), free.space.trace, free.motion(motion)
+    motion = _motion_of(idle)
+    opening, words = np.abs(rows @ motion), free.motion(motion)
     at = node[np.where(opening <= 2 * SPREAD_SHARE * opening.max(), forces, 0.0).argmax()]
     segment, place = np.argwhere(trace.nodes == at)[0]
     return NoEquilibriumError(
@@ -400,16 +398,16 @@ def _concentrated(
 
 
 def _check_work(
-    problem: Problem, free: FreeMotions, rows: Array, equality: Mask, work: Array, noise: Array
+    problem: Problem, space: Space, free: FreeMotions, balance: Balance, work: Array, noise: Array
 ) -> None:
     """Raise unless quadrature, round-off or the mesh's shape made the unbalanced `work` (r,)."""
-    measured = _measured_work(problem, free)
+    measured = _measured_work(problem, space, free)
     if measured is not None:
         work, noise = measured[0], noise + QUADRATURE_ERRORS * measured[1]
-    left, forces = _unbalanced(rows, equality, work)
+    left, forces = balance(work)
     if _is_within(left, forces, noise):
         return
-    motion, mesh = free.motion(_motion_of(left)), free.space.trace.mesh
+    motion, mesh = free.motion(_motion_of(left)), space.trace.mesh
     of_shape, done = 0.0, float(_motion_of(left) @ left)
     if len(set(motion.bodies)) == len(motion.bodies):  # their names tell them apart
         of_shape = abs(float(_change_by_shape(problem, mesh, motion).sum()))
@@ -423,9 +421,9 @@ def _check_work(
         )
 
 
-def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] | None:
+def _measured_work(problem: Problem, space: Space, free: FreeMotions) -> tuple[Array, Array] | None:
     """Work (r,) of the load on the motions, and its measured error (r,); None of numbers."""
-    trace, bodies = free.space.trace, free.bodies
+    trace, bodies = space.trace, free.bodies
     loads, measured = loads_of(problem, trace.mesh), _adaptively if problem.dim == 2 else _by_rules
     if all(numbers(load.data) for load in loads):
         return None
@@ -440,7 +438,7 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
         if here.size and moving.size:
             fields = [free.motion(one).field(0) for one in np.eye(len(work))[moving]]
             powers = tuple(ng.InnerProduct(load.density, field) for field in fields)
-            power, order = trace.model.weighted(ng.CF(powers)), free.space.V.globalorder
+            power, order = trace.model.weighted(ng.CF(powers)), space.V.globalorder
             work_here, error_here = measured(load, power, here, order)
             work[moving] += work_here
             error[moving] += error_here

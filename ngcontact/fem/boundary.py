@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..arrays import Array, Index, Mask, across, for_components, from_triplets, rightward
+from ..arrays import Array, Index, Mask, across, from_triplets, rightward
 from ..lagrange import at, gauss, gauss_lobatto, lagrange, slope
 from ..mesh import CadEdge, CadFace, cad_edges, cad_faces
 from ..problem import POSITION, MeshArrays, Problem, boundary_mask
@@ -67,16 +67,13 @@ def check_element(order: int | str, element: str, dim: int = 2) -> int:
     return int(order)  # NGSolve knows no integers of NumPy
 
 
-def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
+def physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     """P1 in physical coordinates (2.4) inside the quadratic isoparametric space, (N, nv).
 
     On a curved element a linear function of x has the edge function coefficients that its
     values at the edge's interior nodes ask for; those values come from all three vertices.
     """
-    mesh = trace.mesh
-    if V.ndof == 2 * mesh.nv:
-        return sp.eye_array(mesh.nv, format="csr")
-    view = MeshArrays(mesh)
+    mesh, view = trace.mesh, trace.arrays
     xy, triangles = view.vertices, view.elements[trace.element]
     if trace.geometry_order > 2:
         raise ValueError(
@@ -111,12 +108,6 @@ def vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
     boundary = [el.edges[0].nr for el in mesh.Elements(ng.BND)]
     active[mesh.nv + np.array(boundary)] = True  # (2.4): what linear functions of x need
     return ng.Compress(full, active_dofs=ng.BitArray(np.tile(active, 2)))
-
-
-def node_basis(V: ng.FESpace, trace: BoundaryTrace, nodal: Index, element: str) -> sp.csr_array:
-    """`Space.basis` (2N, 2n) for node values on the segments `nodal` (k,)."""
-    scalar = _physical_basis(V, trace) if element == "physical" else trace.nodal_basis(nodal)
-    return for_components(scalar, trace.model.dim)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,11 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask, power_of_two
+from ..arrays import Array, Index, Mask, for_components, power_of_two
 from ..linalg import shared
 from ..problem import Elastic, Hooke, MeshArrays, Problem, body_mask, strain_components, varies
 from ..quadrature import composite, loads_of
-from .boundary import ORDERS, Bodies, BoundaryTrace, node_basis, vector_space
+from .boundary import ORDERS, Bodies, BoundaryTrace, physical_basis, vector_space
 from .model import MODELS, SOLID_MODEL, Model
 from .moduli import rough_moduli
 
@@ -223,11 +223,12 @@ def assemble(
     nodal = np.arange(len(trace.region)) if nodal is None else nodal
     a = _stiffness(problem, trace, V) if known is None else known.form
     A = shared(a.mat)
+    scalar = physical_basis(V, trace) if element == "physical" else trace.nodal_basis(nodal)
     return Space(
         V=V,
         trace=trace,
         nodal=nodal,
-        basis=node_basis(V, trace, nodal, element),
+        basis=for_components(scalar, trace.model.dim),
         form=a,
         A=A,
         inner=(np.diff(A.indptr) == 0) & a.condense,

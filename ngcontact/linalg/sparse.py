@@ -84,13 +84,8 @@ def summed(blocks: Sequence[tuple[Index, Index, Array]], shape: tuple[int, int])
 
 
 def handed_over(K: sp.sparray) -> ng.BaseMatrix:
-    """The SciPy matrix `K` (m, n) for NGSolve: the one whose memory it is in, else a copy."""
+    """A copy of the SciPy matrix `K` (m, n) for NGSolve."""
     K = K.tocsr()
-    memory = K.data
-    while isinstance(memory, np.ndarray):
-        memory = memory.base
-    if isinstance(memory, _View) and (memory.owner.shape, memory.owner.nze) == (K.shape, K.nnz):
-        return memory.owner
     return _from_entries(_rows(K), K.indices, K.data, K.shape)
 
 

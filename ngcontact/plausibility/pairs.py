@@ -28,7 +28,7 @@ from ..contact import (
     facing_pieces,
     in_contact,
     interpolated_rays,
-    links,
+    neighbours,
     opposite,
     partners,
     prescribed_gap,
@@ -187,7 +187,7 @@ def zones_of(state: ContactState) -> ContactZones:
     closed, parts = state.active, line.rows
     if line.dim == 2:
         closed = in_contact(line, closed) if len(corners) else closed
-        parts = np.concatenate([links(line), corners])
+        parts = neighbours(line)
     met, opened = ((parts >= 0) & x[parts] for x in (closed, ~closed))
     first = parts[np.arange(len(parts)), met.argmax(axis=1)]
     label = _labels(np.array([(first[:, None] + 0 * parts)[met], parts[met]]).T, m)
@@ -422,7 +422,8 @@ def drawn_gap_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, f
     Means weighted by force; 0 where normals do not turn or the bodies are drawn touching. Errors up
     to `PEAK_ERROR` are upper bounds.
     """
-    line, force, along = state.line, np.abs(state.force), links(state.line)
+    line, force, along = state.line, np.abs(state.force), neighbours(state.line)
+    along = along[np.diff(line.node[along], axis=1)[:, 0] != 0]
     weight = force[along].sum(axis=1)
     if not weight.any():
         return 0.0, 0.0

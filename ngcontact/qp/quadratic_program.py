@@ -20,7 +20,6 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, Columns, Index, Mask, dense
 
 NULL_SPACE_TOLERANCE = 1e-8  # singular value, of motions of size 1, below which nothing resists
-WEAK_RESISTANCE = 1e-2  # ... up to which rows resist so little that a factorisation loses digits
 CACHE_ROWS = 1 << 14  # rows that are copied at a time: the copy stays in the cache
 
 
@@ -66,10 +65,6 @@ class NullSpace:
         at_pins, held = dense(self.others[self.pins]), np.zeros(self.pins.size, dtype=bool)
         held[separated(at_pins @ combinations, np.arange(self.pins.size))] = True
         return held
-
-    def weakly_resisted(self, rows: Index) -> Mask:
-        """Pins (q,) of the motions that rows with the unknowns `rows` (m,) hardly resist."""
-        return self.held_by(self.unresisted(rows, WEAK_RESISTANCE))
 
 
 def no_null_space(n: int) -> NullSpace:
@@ -208,14 +203,13 @@ class Iterate:
     back_solves: int = 0
 
 
-def terms(A: sp.csr_array, x: Array, rows: int = CACHE_ROWS) -> Array:
-    """|A| |x| (m,), the size of the terms of A x for `x` (n,), by as many `rows` at a time.
+def terms(A: sp.csr_array, x: Array) -> Array:
+    """|A| |x| (m,), the size of the terms of A x for `x` (n,).
 
     A second matrix of the size of `A` (m, n) is not made.
     """
-    x = np.abs(x)
-    parts = [abs(A[start : start + rows]) @ x for start in range(0, A.shape[0], rows)]
-    return np.concatenate([np.zeros(0), *parts])
+    starts, x = range(0, A.shape[0], CACHE_ROWS), np.abs(x)
+    return np.concatenate([np.zeros(0), *(abs(A[k : k + CACHE_ROWS]) @ x for k in starts)])
 
 
 def kkt_residuals(program: QuadraticProgram, minimiser: Iterate) -> dict[str, float]:

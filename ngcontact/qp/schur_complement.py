@@ -19,6 +19,7 @@ FINE_RESIDUAL = 1e-14  # ... and of the last system
 LOOSE_RESIDUAL = 1e-8  # ... that a step of another iteration may leave: rows change more than that
 BORDER = 20  # back-solves that cost as much as a factorisation: measured 17 to 25
 BORDER_ROUND_OFF = 1e-14  # of its singular values, relative to the largest
+WEAK_RESISTANCE = 1e-2  # singular value, of motions of size 1, up to which a factor loses digits
 WEAK = 1e-9  # stiffness of pins, compliance of rows in dense programs, that may be singular
 SINGULAR_RESIDUAL = 1e-6  # residual, relative to the first, above which the matrix is singular
 # ... unless it is that of values that balance each other.
@@ -256,7 +257,8 @@ class BorderedSystems:
         self.forget()  # two factorisations at a time would double the memory
         closed = active & (p.R is None)
         held = p.unknown[closed] if p.R is None else p.unknown  # of other rows none
-        pinned = p.null_space.weakly_resisted(held) | (pulled > 0)
+        weak = p.null_space.unresisted(held, WEAK_RESISTANCE)
+        pinned = p.null_space.held_by(weak) | (pulled > 0)
         free = ~p.fixed
         free[np.concatenate([p.null_space.held, p.null_space.pins[pinned], held])] = False
         known, none = np.zeros((0, p.b.size)), np.zeros_like(closed)

@@ -36,8 +36,6 @@ def state_of(solution: Solved) -> dict[str, Any]:
     arrays = by_field(discrete)
     for name in ("problem", "space", "program", "systems"):
         del arrays[name]
-    if discrete.rigid is not None:
-        arrays["rigid"] = discrete.rigid.on(None)
     program = by_field(discrete.program)
     del program["K"]
     return {
