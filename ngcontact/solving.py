@@ -422,18 +422,12 @@ def _first_plan(
     if plane:
         found = joined([corners(problem, boundary_trace(mesh, 1)), found])
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)
-    if start is None or _is_exact(start):
+    if start is None or at_round_off(start, start.error_estimate):
         return plan
     goal = refinement.tolerance
     if refinement.guaranteed and goal is not None:
         goal /= _bound_ratio(start) if start.bounded else BOUND_RATIO
     return continued(problem, start, replace(plan, tree=start.tree), refinement, goal)
-
-
-def _is_exact(solution: Solution) -> bool:
-    """Whether its error is round-off."""
-    space, u = solution.discrete.space, solution.displacement
-    return at_round_off(solution.problem, space, u, solution.error_estimate)
 
 
 def _bound_ratio(solution: Solution) -> float:
@@ -484,7 +478,8 @@ def levels(
             error = estimate
             if excluded.any():  # no mesh makes the estimate less there
                 error *= root_of_squares(solution.indicators[~excluded]) / solution.error_estimate
-        if not unresolved_data and (error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution)):
+        exact = error <= EXACT_ESTIMATE or at_round_off(solution, solution.error_estimate)
+        if not unresolved_data and (error <= goal or exact):
             return
         expected = ratio * estimate if guaranteed else error
         of_data = np.any([np.zeros_like(excluded), *unresolved_data.values()], axis=0)

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask, across, joined, root_of_squares
+from ..arrays import Array, Index, Mask, joined, root_of_squares
 from ..estimator import Estimated
 from ..fem import unknowns
 from ..mesh import curve
 from ..problem import MeshArrays, Problem
 from .marking import doerfler
-from .planning import Aim, Forecast, Plan, Refinement, areas, planned, touching
+from .planning import Aim, Forecast, Plan, Refinement, areas, depths, planned, touching
 from .refinement import RefinementTree, Refining
 from .singularities import at_limit, below_resolution, ends_of_contact
 
@@ -102,20 +102,10 @@ def _inside(places: Array, inside: Index, corners: Array, parent: Index) -> Inde
     for number in range(count.max()):
         several = np.flatnonzero((count[inside] > 1) & (number < count[inside]))
         part = order[first[inside[several]] + number]
-        depth = _depths(corners[part], places[several])
+        depth = depths(corners[part], places[several])
         better = depth > deepest[several]
         found[several[better]], deepest[several[better]] = part[better], depth[better]
     return found
-
-
-def _depths(corners: Array, places: Array) -> Array:
-    """Least barycentric coordinates (n,) of `places` (n, 2) in triangles, negative outside.
-
-    Of triangles with `corners` (n, 3, 2).
-    """
-    inwards = across(np.roll(corners, -1, axis=1) - corners)
-    height = ((places[:, None] - corners) * inwards).sum(axis=2)
-    return np.asarray(height.min(axis=1) / (2 * areas(corners)))
 
 
 def transferred(known: Forecast, inside: Index, corners: Array) -> Array:

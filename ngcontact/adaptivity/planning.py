@@ -201,16 +201,24 @@ def planned(
 
 
 def areas(corners: Array) -> Array:
-    """Areas (k,) of triangles with the `corners` (k, 3, 2)."""
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return np.asarray(np.abs((across(first) * second).sum(axis=1)) / 2)
+    """Areas (...,) of triangles with the `corners` (..., 3, 2)."""
+    first, second = corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
+    return np.asarray(np.abs((across(first) * second).sum(axis=-1)) / 2)
+
+
+def depths(corners: Array, places: Array) -> Array:
+    """Least barycentric coordinates (...,) of `places` (..., 2), negative outside of triangles.
+
+    Of triangles with `corners` (..., 3, 2).
+    """
+    inwards = across(np.roll(corners, -1, axis=-2) - corners)
+    height = np.einsum("...d,...id->...i", places, inwards) - (corners * inwards).sum(axis=-1)
+    return np.asarray(height.min(axis=-1) / (2 * areas(corners)))
 
 
 def touching(corners: Array, places: Array) -> Mask:
     """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
-    inwards = across(np.roll(corners, -1, axis=1) - corners)
-    height = inwards @ places.T - (inwards * corners).sum(axis=2)[..., None]
-    return np.asarray(height.min(axis=1) >= -2 * TOUCHING_COORDINATE * areas(corners)[:, None])
+    return depths(corners[:, None], places) >= -TOUCHING_COORDINATE
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,7 +68,17 @@ class IterativeSystems(BorderedSystems):
         def to_round_off() -> None:
             if self.solved is None or (self.solved != active).any():
                 self._iterate(active)
-            self._refine(active)
+            multigrid = self.multigrid or self._held(active)
+            floor = TERM_ROUND_OFF * float(terms(self.program.K, self.y).max(initial=0.0))
+            target = max(FINE_RESIDUAL * self.scale, floor)
+            residual = self.unbalanced(active)
+            for _ in range(RESTARTS):
+                if multigrid.largest(residual) <= target:
+                    return
+                self._add(multigrid, residual, target)
+                residual = self.unbalanced(active)
+            if not multigrid.largest(residual) <= COARSE_RESIDUAL * self.scale:
+                raise StalledError(f"{RESTARTS} solutions left more than {target:.1e}")
 
         if self._converges(anchor, to_round_off):
             return self.y.copy(), self.force.copy()
@@ -125,17 +135,3 @@ class IterativeSystems(BorderedSystems):
         self.back_solves += count
         self.y += x
         return count
-
-    def _refine(self, active: Mask) -> None:
-        """Reduce the residual of the last solution to round-off."""
-        multigrid = self.multigrid or self._held(active)
-        floor = TERM_ROUND_OFF * float(terms(self.program.K, self.y).max(initial=0.0))
-        target = max(FINE_RESIDUAL * self.scale, floor)
-        residual = self.unbalanced(active)
-        for _ in range(RESTARTS):
-            if multigrid.largest(residual) <= target:
-                return
-            self._add(multigrid, residual, target)
-            residual = self.unbalanced(active)
-        if not multigrid.largest(residual) <= COARSE_RESIDUAL * self.scale:
-            raise StalledError(f"{RESTARTS} solutions left more than {target:.1e}")

@@ -88,8 +88,8 @@ def pair_warnings(solution: Solved, *, last: bool) -> dict[tuple[str, int], str]
     move rigidly, and loads that bring no pair into contact. Solids that are drawn far apart are not
     checked.
     """
-    problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
-    trace, plane, program = space.trace, problem.dim == 2, solution.discrete.program
+    pairs, program = solution.pairs, solution.discrete.program
+    trace = solution.discrete.space.trace
     found: dict[tuple[str, int], str] = {}
     largest = [np.abs(state.force).max(initial=0.0) for state in pairs]
     noise = FORCE_ROUND_OFF * np.abs(program.diagonal * solution.minimiser.u).max(initial=0.0)
@@ -98,18 +98,14 @@ def pair_warnings(solution: Solved, *, last: bool) -> dict[tuple[str, int], str]
     noise = max(noise, FORCE_ROUND_OFF * max(largest, default=0.0))
     peak = max((state.pressure.max(initial=0.0) for state in pairs), default=0.0)
     for number, (state, force) in enumerate(zip(pairs, largest, strict=True)):
-        messages = {}
-        if force > noise:
-            zones = zones_of(state)
-            messages["strain"] = _large_strains(solution, state, zones)
-            if not messages["strain"]:  # else no other check means anything
-                messages["direction"] = _inclined(trace, state)
-                messages["gap"] = contradicted(trace, state)
-            if plane and not messages["strain"]:
-                messages["direction"] = messages["direction"] or _drawn_apart(trace, state)
-            if last and not messages["strain"]:
+        zones = zones_of(state) if force > noise else None
+        messages = {"strain": _large_strains(solution, state, zones) if zones else ""}
+        if zones and not messages["strain"]:  # else no other check means anything
+            messages["direction"] = _inclined(trace, state) or _drawn_apart(trace, state)
+            messages["gap"] = contradicted(trace, state)
+            if last:
                 messages["zone"] = _held_apart(solution, state) or _small_zone(trace, state, zones)
-        if last and not messages.get("strain"):  # with forces or without
+        if last and not messages["strain"]:  # with forces or without
             messages["penetration"] = _penetration(solution, state, peak)
         name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
@@ -403,8 +399,8 @@ def inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> Array:
 
 
 def _drawn_apart(trace: BoundaryTrace, state: ContactState) -> str:
-    """Message where normals turn over the gap that is drawn; "" elsewhere."""
-    if state.line.contact.direction is not None:
+    """Message where normals turn over the gap that is drawn; "" elsewhere, and of solids."""
+    if state.line.contact.direction is not None or state.line.dim == 3:
         return ""
     gap, error = drawn_gap_error(trace, state)
     if error <= PEAK_ERROR:

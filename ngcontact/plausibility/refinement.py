@@ -9,8 +9,8 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, root_of_squares
-from ..fem import Space, energy_norm, moduli_of
-from ..problem import MeshArrays, Problem
+from ..problem import MeshArrays
+from ..solved import Solved
 
 RISING_LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
 EXACT_ESTIMATE = 1e-12  # relative estimate at which refinement stops: the solution is exact
@@ -21,21 +21,18 @@ STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 
 RISE_FACTOR = 1.1  # over the best one, which is more than the noise of one level
 
 
-def at_round_off(
-    problem: Problem, space: Space, displacement: ng.GridFunction, estimate: float
-) -> bool:
+def at_round_off(solution: Solved, estimate: float) -> bool:
     """Whether an error estimate is round-off of terms that cancel, as where bodies move rigidly.
 
     Where div u cancels the terms of the stress are of size kappa |grad u|. The estimate divides
     them by the root of mu, their energy by the root of kappa only.
     """
-    terms = space.terms(displacement)
+    terms = solution.discrete.space.terms(solution.displacement)
     if estimate > NOISE_LIMIT * terms:  # as nearly always
         return False
-    energy = energy_norm(problem, space, displacement)
-    if estimate <= RIGID_ESTIMATE * terms and energy <= EXACT_ESTIMATE * terms:
+    if estimate <= RIGID_ESTIMATE * terms and solution.energy_norm <= EXACT_ESTIMATE * terms:
         return True  # nothing deforms, and the rest is the round-off of gaps
-    ratio = float(moduli_of(problem, space.trace.mesh).ratio.max())
+    ratio = float(solution.moduli.ratio.max())
     return estimate <= max(EXACT_ESTIMATE, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
