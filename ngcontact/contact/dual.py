@@ -9,6 +9,7 @@ phi the dual basis: int psi_i phi_j = 0 for i other than j. The row of node j we
 with D_j the integral of phi_j over all facing parts, so that it has one unknown of the secondary as
 (2.10) has. Where normals turn the weights are changed a little, so that the force on the primary is
 in line with that on the node: moments balance, and no row resists the turn of a shaft in its hub.
+Forces that act beside nodes, on solids that face in part, are along normals that belong there.
 Dual bases: Wohlmuth 2000, SIAM J. Numer. Anal. 38:989; of higher order Popp, Wohlmuth, Gee, Wall
 2012, SIAM J. Sci. Comput. 34:B421. On Gauss-Lobatto nodes the psi of straight segments that face
 wholly contain the continuous functions of degree p - 1, since the quadrature of these nodes is
@@ -28,10 +29,11 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask, from_triplets, rows_of
+from ..arrays import Array, Index, Mask, from_triplets, rotations, rows_of
 from ..fem import BoundaryTrace, FacetTrace
 from ..lagrange import lagrange
 from ..problem import Contact
+from ..qp import vanishing_combinations
 from ..reference import triangle
 from .facing import (
     SLIVER,
@@ -205,6 +207,24 @@ def _passed_on(line: ContactLine, rows: Index, held: Mask) -> Index:
     return np.asarray(to[rows])
 
 
+def _across_turns(line: ContactLine, place: Array, d: Array) -> Array:
+    """Unit vectors (m, 3) near `d` (m, 3), across what moves the secondary in itself at `place`.
+
+    These are the rigid motions that are nowhere along the normals at the nodes of the `line`: turns
+    and shifts of round and plane faces close no gap, nor do forces beside the nodes resist them.
+    """
+    middle, size = line.position.mean(axis=0), np.ptp(line.position, axis=0).max()
+
+    def moved(x: Array) -> Array:
+        shifts = np.broadcast_to(np.eye(3), (len(x), 3, 3))
+        return np.concatenate([shifts, rotations((x - middle) / size)], axis=2)
+
+    resisted = np.einsum("mi,mij->mj", line.direction, moved(line.position))
+    along = moved(place) @ vanishing_combinations(resisted)
+    d = d - np.einsum("mij,mjk,mk->mi", along, np.linalg.pinv(along, SLIVER), d)
+    return np.asarray(d / np.linalg.norm(d, axis=1)[:, None])
+
+
 def _in_line(place: Array, line: ContactLine, primary: Index, coupling: sp.csr_array) -> Array:
     """Changes (e,) of the weights of a `coupling` (m, n) that bring reactions in line with forces.
 
@@ -265,6 +285,7 @@ def with_dual_rows(
         fixed[:-1] |= (reached > 0) & (nodal + reached < MIN_COVERED * whole)
         sums = from_triplets(np.ones(here.sum()), rows[here], np.flatnonzero(here), shape)
         fixed[:-1] |= abs(sums @ coupling).sum(axis=1) > LARGEST_SUM * reached
+    passed = sp.csr_array(coupling.shape)
     if fixed.any():
         rows = np.where(here, _passed_on(line, np.where(here, rows, -1), fixed), rows)
         slot = np.flatnonzero(rows != own)
@@ -299,12 +320,15 @@ def with_dual_rows(
     place = np.zeros((coupling.shape[1], trace.model.dim))
     for side in (line.segments, line.facing):
         place[trace.nodes[side]] = trace.positions(side)
-    if contact.direction is None:
-        coupling.data += _in_line(place, line, trace.nodes[line.facing], coupling)
     if isinstance(trace, FacetTrace):  # where forces act, so that moments balance
         position = np.where(trace.bernstein[line.node, None], place[line.node], position)
-        if fixed.any():
-            position = position - mean @ passed @ place
+        position = position - mean @ passed @ place
+    if contact.direction is None:
+        if (position != line.position).any():  # whose normals are means and coefficients, too
+            normal = D[..., None] * trace.unknowns_of_values(segments, line.direction[own])
+            d = share[:, None] * line.direction + mean @ normal.reshape(D.size, -1)
+            line = replace(line, direction=_across_turns(line, position, d))
+        coupling.data += _in_line(place, line, trace.nodes[line.facing], coupling)
     line = replace(
         line,
         rows=points,
