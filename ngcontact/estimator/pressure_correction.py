@@ -15,7 +15,8 @@ the last term measures the deviatoric error, because e is orthogonal to v_h.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
@@ -30,135 +31,113 @@ from .terms import BoundaryResidual, ScaledSolution
 
 # Stiffness of supports in the last term, relative to the elements beside them.
 SUPPORT_STIFFNESS = 1e6
+CURVED = 2  # quadrature orders for the maps of curved elements
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
 
 
+@dataclass(frozen=True, eq=False)
 class PressureCorrection:
-    """The minimising delta on nearly incompressible bodies `names`, and the v_h of the supremum.
+    """What the minimising delta adds to residuals, over the unit of stress."""
 
-    For that the supremum is mu |grad v_h|^2. `residuals` are div sigma_h + F, (2,), in the elements
-    and [sigma_h n], (2,), on their edges, `terms` those on the boundary. `element` and `edge` are
-    the weights of squared residuals, constant on each element, as are shear and bulk moduli;
-    pressures and moduli are in the units of the `solution`.
+    divergence: ng.CoefficientFunction  # grad delta, (2,)
+    jump: ng.CoefficientFunction  # [delta n], (2,)
+    on_boundary: list[Array]  # (k, c) of each term on the boundary
+    squares: Array  # (ne,), of the two terms that delta itself adds
+
+
+def pressure_correction(
+    solution: ScaledSolution,
+    names: Iterable[str],
+    divergence: ng.CoefficientFunction,
+    jump: ng.CoefficientFunction,
+    terms: Sequence[BoundaryResidual],
+) -> PressureCorrection:
+    """The minimising delta on nearly incompressible bodies `names`, found with v_h of the supremum.
+
+    For that the supremum is mu |grad v_h|^2. Residuals are div sigma_h + F in the elements, the
+    `divergence` (2,), [sigma_h n] on their edges, the `jump` (2,), and the `terms` on the boundary.
+    Pressures and moduli are in the units of the `solution`.
     """
+    problem, mesh, model = solution.problem, solution.mesh, solution.model
+    weighted, n = model.weighted, ng.specialcf.normal(2)
+    region = mesh.Materials("|".join(map(re.escape, names)))
+    pressures = ng.L2(mesh, order=solution.order, dgjumps=True)
+    motions = ng.VectorH1(mesh, order=solution.order, definedon=region)
+    (delta, t), (v, w) = pressures.TnT(), motions.TnT()
 
-    def __init__(
-        self,
-        solution: ScaledSolution,
-        names: Sequence[str],
-        residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
-        terms: Sequence[BoundaryResidual],
-    ) -> None:
-        mesh, order = solution.mesh, solution.order
-        self.solution, self.model = solution, solution.model
-        self.region = mesh.Materials("|".join(map(re.escape, names)))
-        self.space = ng.L2(mesh, order=order, dgjumps=True)
-        self.functions = self.space.ndof // mesh.ne  # on an element; they are numbered one by one
-        self.V = ng.VectorH1(mesh, order=order, definedon=self.region)
+    def constant(values: Array) -> ng.GridFunction:
+        function = ng.GridFunction(ng.L2(mesh, order=0))
+        function.vec.FV().NumPy()[:] = values
+        return function
 
-        def constant(values: Array) -> ng.GridFunction:
-            function = ng.GridFunction(ng.L2(mesh, order=0))
-            function.vec.FV().NumPy()[:] = values
-            return function
+    element, edge = constant(solution.element_weight), constant(solution.edge_weight)
+    edge = (edge + edge.Other()) / 2
+    mu, kappa = constant(solution.mu), constant(moduli_of(problem, mesh).bulk / solution.modulus)
+    bedding = FLOATING / float(np.ptp(solution.boundary.curve, axis=(0, 1)).max()) ** 2
+    inside = ng.dx(definedon=region, bonus_intorder=model.bonus + CURVED)
+    skeleton = ng.dx(skeleton=True, bonus_intorder=2)
+    a, f = ng.BilinearForm(pressures, symmetric=True), ng.LinearForm(pressures)
+    a += weighted(element * ng.Grad(delta) * ng.Grad(t) + delta * t / kappa) * ng.dx
+    a += weighted(edge * (delta - delta.Other()) * (t - t.Other())) * skeleton
+    f += weighted(-element * divergence * ng.Grad(t)) * ng.dx(bonus_intorder=2)
+    f += weighted(-edge * (jump * n) * (t - t.Other())) * skeleton
+    b = ng.BilinearForm(trialspace=pressures, testspace=motions)
+    b += weighted(delta * model.volume(w)) * inside
+    k = ng.BilinearForm(motions, symmetric=True)
+    k += weighted(mu * (model.gradients(v, w) + bedding * v * w)) * inside
+    held = ng.BoundaryFromVolumeCF(SUPPORT_STIFFNESS * mu) / ng.specialcf.mesh_size
+    products = [
+        (pattern, v.Trace()[axis] * w.Trace()[axis])
+        for pattern, components in problem.displacement.items()
+        for axis, value in enumerate(components)
+        if value is not None
+    ]
+    if problem.guide is not None:
+        products.append((problem.guide, (v.Trace() * n) * (w.Trace() * n)))
+    for pattern, product in products:
+        k += weighted(held * product) * ng.ds(definedon=mesh.Boundaries(pattern))
+    for form in (a, f, b, k):
+        form.Assemble()
+    R = sp.vstack([_on_boundary(solution, pressures, term) for term in terms], "csr")
+    weight = np.concatenate([np.repeat(x.weight, x.residual.shape[1]) for x in terms])
+    residual = np.concatenate([x.residual.ravel() for x in terms])
+    ends = np.cumsum([x.residual.size for x in terms])
+    A, B, K = shared(a.mat) + R.T @ R.multiply(weight[:, None]), shared(b.mat), shared(k.mat)
+    # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a factorisation
+    # without pivots.
+    saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
+    right = np.append(f.vec.FV().NumPy() - R.T @ (weight * residual), np.zeros(motions.ndof))
+    elements, size = region_mask(region)[MeshArrays(mesh).bodies], pressures.ndof
+    free = np.append(elements.repeat(size // mesh.ne), K.diagonal() > 0)
+    found = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
+    delta, v = ng.GridFunction(pressures), ng.GridFunction(motions)
+    delta.vec.FV().NumPy()[:], v.vec.FV().NumPy()[:] = found[:size], found[size:]
+    density = weighted(delta**2 / kappa + mu * model.gradients(v, v))
+    return PressureCorrection(
+        divergence=ng.Grad(delta),
+        jump=(delta - delta.Other()) * n,
+        on_boundary=[
+            change.reshape(term.residual.shape)
+            for change, term in zip(np.split(R @ found[:size], ends[:-1]), terms, strict=True)
+        ],
+        squares=np.asarray(ng.Integrate(density, region, element_wise=True)),
+    )
 
-        self.element = constant(solution.element_weight)
-        self.edge = constant(solution.edge_weight)
-        self.mu = constant(solution.mu)
-        self.kappa = constant(moduli_of(solution.problem, mesh).bulk / solution.modulus)
-        (A, b), B, K = self._inside(*residuals), self._divergence(), self._stiffness()
-        on_boundary = [self._on_boundary(term) for term in terms]
-        for R, term in zip(on_boundary, terms, strict=True):
-            weight = np.repeat(term.weight, term.residual.shape[1])
-            A = A + R.T @ R.multiply(weight[:, None])
-            b -= R.T @ (weight * term.residual.ravel())
-        # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a
-        # factorisation without pivots.
-        size, inside = self.space.ndof, region_mask(self.region)[MeshArrays(mesh).bodies]
-        free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
-        saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
-        right = np.append(b, np.zeros(K.shape[0]))
-        found = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
-        self.pressure, self.motion = ng.GridFunction(self.space), ng.GridFunction(self.V)
-        self.pressure.vec.FV().NumPy()[:] = found[:size]
-        self.motion.vec.FV().NumPy()[:] = found[size:]
-        self.corrected = [  # residuals (k, c) of the `terms` with delta
-            term.residual + (R @ found[:size]).reshape(term.residual.shape)
-            for R, term in zip(on_boundary, terms, strict=True)
-        ]
 
-    def divergence_and_jump(self) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
-        """Grad delta and [delta n]: what delta adds inside the bodies, two of two components."""
-        delta = self.pressure
-        return ng.Grad(delta), (delta - delta.Other()) * ng.specialcf.normal(2)
-
-    def squares(self) -> Array:
-        """Squares (ne,) of the two terms that delta itself adds."""
-        gradients = self.model.gradients(self.motion, self.motion)
-        density = self.model.weighted(self.pressure**2 / self.kappa + self.mu * gradients)
-        return np.asarray(ng.Integrate(density, self.region, element_wise=True))
-
-    def _inside(
-        self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction
-    ) -> tuple[sp.csr_array, Array]:
-        """Quadratic form and right side (n,) of the terms in elements and between them."""
-        d, t = self.space.TnT()
-        weighted, element = self.model.weighted, self.element
-        edge, n = (self.edge + self.edge.Other()) / 2, ng.specialcf.normal(2)
-        skeleton = ng.dx(skeleton=True, bonus_intorder=2)
-        a = ng.BilinearForm(self.space, symmetric=True)
-        a += weighted(element * ng.Grad(d) * ng.Grad(t) + d * t / self.kappa) * ng.dx
-        a += weighted(edge * (d - d.Other()) * (t - t.Other())) * skeleton
-        f = ng.LinearForm(self.space)
-        f += weighted(-element * divergence * ng.Grad(t)) * ng.dx(bonus_intorder=2)
-        f += weighted(-edge * (jump * n) * (t - t.Other())) * skeleton
-        a.Assemble()
-        f.Assemble()
-        return shared(a.mat), f.vec.FV().NumPy().copy()
-
-    def _on_boundary(self, term: BoundaryResidual) -> sp.csr_array:
-        """Matrix (k * c, n) from coefficients of delta to what it adds to residuals (k, c)."""
-        boundary, (k, c), size = self.solution.boundary, term.residual.shape, self.space.ndof
-        numbers = np.arange(size).reshape(-1, self.functions)
-        shapes = ng.BoundaryFromVolumeCF(local_functions(self.space, numbers))
-        rows = sp.csr_array((k * c, size))
-        for share in term.shares:
-            if len(share.at):
-                value = boundary.evaluate(shapes, share.segment, share.s)
-                column = numbers[boundary.element[share.segment], None]
-                row = share.at[:, None, None] * c + np.arange(c)[:, None]
-                row, column = np.broadcast_arrays(row, column)
-                entries = share.factor[:, :, None] * value[:, None, :]
-                rows += from_triplets(entries.ravel(), row.ravel(), column.ravel(), rows.shape)
-        return rows
-
-    def _stiffness(self) -> sp.csr_array:
-        """Form of mu |grad v|^2, with v held where displacements are prescribed."""
-        problem, mesh, model = self.solution.problem, self.solution.mesh, self.model
-        u, v = self.V.TnT()
-        position = self.solution.boundary.curve.reshape(-1, 2)
-        bedding = FLOATING / float(np.ptp(position, axis=0).max()) ** 2
-        a = ng.BilinearForm(self.V, symmetric=True)
-        work = self.mu * (model.gradients(u, v) + bedding * u * v)
-        a += model.weighted(work) * ng.dx(definedon=self.region, bonus_intorder=model.bonus)
-        held = ng.BoundaryFromVolumeCF(SUPPORT_STIFFNESS * self.mu) / ng.specialcf.mesh_size
-        for pattern, components in problem.displacement.items():
-            for axis, value in enumerate(components):
-                if value is not None:
-                    ds = ng.ds(definedon=mesh.Boundaries(pattern))
-                    a += model.weighted(held * u.Trace()[axis] * v.Trace()[axis]) * ds
-        if problem.guide is not None:
-            n = ng.specialcf.normal(2)
-            ds = ng.ds(definedon=mesh.Boundaries(problem.guide))
-            a += model.weighted(held * (u.Trace() * n) * (v.Trace() * n)) * ds
-        a.Assemble()
-        return shared(a.mat)
-
-    def _divergence(self) -> sp.csr_array:
-        """(q, div v) of pressures q and displacements v."""
-        pressures = ng.L2(self.solution.mesh, order=self.solution.order)
-        q, v = pressures.TrialFunction(), self.V.TestFunction()
-        b = ng.BilinearForm(trialspace=pressures, testspace=self.V)
-        work = self.model.weighted(q * self.model.volume(v))
-        b += work * ng.dx(definedon=self.region, bonus_intorder=self.model.bonus)
-        b.Assemble()
-        return shared(b.mat)
+def _on_boundary(
+    solution: ScaledSolution, pressures: ng.FESpace, term: BoundaryResidual
+) -> sp.csr_array:
+    """Matrix (k * c, n) from coefficients of delta to what it adds to residuals (k, c)."""
+    boundary, (k, c) = solution.boundary, term.residual.shape
+    numbers = np.arange(pressures.ndof).reshape(solution.mesh.ne, -1)  # those of elements, in order
+    shapes = ng.BoundaryFromVolumeCF(local_functions(pressures, numbers))
+    rows = sp.csr_array((k * c, numbers.size))
+    for share in term.shares:
+        if len(share.at):
+            value = boundary.evaluate(shapes, share.segment, share.s)
+            column = numbers[boundary.element[share.segment], None]
+            row = share.at[:, None, None] * c + np.arange(c)[:, None]
+            row, column = np.broadcast_arrays(row, column)
+            entries = share.factor[:, :, None] * value[:, None, :]
+            rows += from_triplets(entries.ravel(), row.ravel(), column.ravel(), rows.shape)
+    return rows

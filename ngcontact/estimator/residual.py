@@ -52,7 +52,7 @@ from ..linalg import cholesky, lower_half, shared
 from ..quadrature import features_of, loads_of, pieces, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
-from .pressure_correction import PressureCorrection
+from .pressure_correction import pressure_correction
 from .surfaces import surface_terms
 from .terms import (
     DATA_BONUS,
@@ -311,12 +311,10 @@ def _squares(
     degree, corrected = solution.projected.space.globalorder, [x.residual for x in residuals]
     names = nearly_incompressible(mesh, corrected_from, solution.incompressibility)
     if names:
-        correction = PressureCorrection(solution, list(names), (divergence, jump), residuals)
-        parts["incompressibility"] = correction.squares()
-        of_pressure = correction.divergence_and_jump()
-        divergence += of_pressure[0]
-        jump += of_pressure[1]
-        corrected, degree = correction.corrected, order
+        found = pressure_correction(solution, names, divergence, jump, residuals)
+        parts["incompressibility"] = found.squares
+        divergence, jump, degree = divergence + found.divergence, jump + found.jump, order
+        corrected = [x + delta for x, delta in zip(corrected, found.on_boundary, strict=True)]
     data = DATA_BONUS if problem.force else 0
     if degree or data:  # else there is no divergence
         followed = 2 * (max(order, 2) + 1) if of_loads else 0  # of polynomials for rough forces
