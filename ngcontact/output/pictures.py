@@ -1,19 +1,19 @@
-"""Pictures and films of solutions: deformed bodies with a field, close-ups, contact pressure."""
+"""Pictures and films of solutions: deformed bodies, contact pressure; pictures of convergence."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import Array, Index
+from ..estimator import Guaranteed
 from ..solved import Solved
-from .files import check_path, replacing, several
+from .files import check_path, replacing
 from .scene import Scene, Style, coordinates, picture
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ HEIGHT = 5.0  # of a picture, inches
 # Below and above these powers of ten an axis has one common power of ten.
 POWERS: dict[str, Any] = {"scilimits": (-3, 4), "useMathText": True}
 PROFILE_SAMPLES = 400  # points at which a given profile is drawn
+NO_PRESSURE = 1e-6  # of the largest: pairs with less are named, and not drawn
 STROKES = ("--", ":", "-.", "-")
 
 MAX_CLOSE_UPS = 4
@@ -52,7 +53,11 @@ FILM_DPI = 80
 FILM_HEADROOM = 1.05  # end of the scale of a film over its largest pressure
 FILM_LAST = 3  # times as long as others the last frame is seen
 
+TRIANGLE_SPAN = 2.5  # of a triangle's side along the unknowns
+TRIANGLE_DEPTH = 0.6  # of the curve, where a triangle lies
+
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
+Run = Sequence[Guaranteed] | tuple[Any, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +100,6 @@ def plot_solution(
     scene = picture(solution, style)
     figure = new_figure(target)
     draw_scene(figure, scene, view_of([scene]))
-    for _ in range(2):  # labels move with the ticks that a first layout leaves
-        figure.draw_without_rendering()
     show(figure, target)
     return figure
 
@@ -159,9 +162,11 @@ def write_film(
         No solutions, titles of another number, an option that is none, a path that cannot be
         written: before any work.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
     from PIL import Image
 
-    frames, style = list(several(solutions)), Style(**options)
+    frames, style = list(solutions), Style(**options)
     if not frames:
         raise ValueError("solutions: give one at least")
     if titles is not None and len(titles) != len(frames):
@@ -178,7 +183,13 @@ def write_film(
         f"{k + 1} of {len(frames)}: {s.displacement.space.ndof} unknowns"
         for k, s in enumerate(frames)
     ]
-    images = [_frame(scene, title, view) for scene, title in zip(scenes, titles, strict=True)]
+    images = []
+    for scene, heading in zip(scenes, titles, strict=True):
+        figure = Figure(layout="constrained", dpi=FILM_DPI)
+        canvas = FigureCanvasAgg(figure)
+        draw_scene(figure, scene, view, heading)
+        canvas.draw()
+        images.append(np.asarray(canvas.buffer_rgba())[..., :3])
     # A common palette: one stress has one colour in all frames.
     every, plain = Image.fromarray(np.vstack(images)), Image.Dither.NONE
     palette = every.quantize(256, method=Image.Quantize.MAXCOVERAGE)
@@ -188,20 +199,6 @@ def write_film(
     with replacing(target) as (draft,):
         first.save(draft, format="GIF", save_all=True, **shown)
     return target
-
-
-def _frame(scene: Scene, title: str, view: View) -> NDArray[np.uint8]:
-    """A frame of a film, (height, width, 3) of bytes."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(layout="constrained", dpi=FILM_DPI)
-    draw_scene(figure, scene, view)
-    figure.suptitle(title)
-    canvas = FigureCanvasAgg(figure)
-    for _ in range(2):  # labels move with the ticks that a first layout leaves
-        canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def corners(scenes: Sequence[Scene]) -> Window:
@@ -275,7 +272,7 @@ def colour_limits(
     return (-top, top) if values.min(initial=0.0) < 0 else (0.0, top)
 
 
-def draw_scene(figure: Figure, scene: Scene, view: View) -> None:
+def draw_scene(figure: Figure, scene: Scene, view: View, heading: str = "") -> None:
     """Draw a scene with close-ups, colour scale and pressure.
 
     Bodies are on the left, close-ups in the middle, two in a column, and pressures on the right, a
@@ -305,8 +302,10 @@ def draw_scene(figure: Figure, scene: Scene, view: View) -> None:
     _draw_windows(bodies, close, windows, length)
     label, kind = scene.shown.label, scene.shown.kind
     label, (_, unit) = style.title(label, kind), style.unit(kind)
-    extremes = float(scene.values.min()) / unit, float(scene.values.max()) / unit
-    colour_bar(figure, shading, [bodies, *close], label, extremes)
+    colour_bar(figure, shading, [bodies, *close], label, scene.values / unit)
+    figure.suptitle(heading)
+    for _ in range(2):  # labels move with the ticks that a first layout leaves
+        figure.draw_without_rendering()
 
 
 def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
@@ -353,16 +352,16 @@ def _draw_windows(
             bodies.annotate(str(k + 1), (right, top), **at, color="crimson", weight="bold")
 
 
-def colour_bar(
-    figure: Figure, shading: Any, axes: list[Axes], label: str, extremes: tuple[float, float]
-) -> None:
-    """Colour bar; arrows and numbers tell the `extremes`, least and largest, beyond its ends."""
-    (least, most), (low, high) = extremes, shading.get_clim()
+def colour_bar(figure: Figure, shading: Any, axes: list[Axes], label: str, values: Array) -> None:
+    """Colour bar; arrows and numbers tell the least and the largest of `values` beyond its ends."""
+    least, most, (low, high) = float(values.min()), float(values.max()), shading.get_clim()
     below, above = least < low, most > high
     extend = ("neither", "min", "max", "both")[below + 2 * above]
     label += f", least {least:.3g}" * below + f", largest {most:.3g}" * above
     bar = figure.colorbar(shading, ax=axes, label=label, extend=extend)
     bar.ax.ticklabel_format(axis="y", **POWERS)
+    if least == most == 0.0:
+        bar.set_ticks([0.0])
 
 
 def shown_parts(scenes: Sequence[Scene]) -> list[Array]:
@@ -403,6 +402,8 @@ def _draw_pressures(several: Sequence[Axes], scene: Scene, view: View) -> None:
         first.set_ylim(-0.03 * view.top / stress, view.top / stress)
         if largest > view.top:
             first.set_ylabel(f"{first.get_ylabel()}, largest {largest / stress:.3g}")
+    if not (largest or scene.style.profile):
+        first.set_yticks([0.0])
     for axes in several[1:]:
         axes.set(ylabel="", title="")
     handles, labels = last.get_legend_handles_labels()
@@ -416,8 +417,11 @@ def _draw_pressure(axes: Axes, scene: Scene, part: Array) -> None:
     solution, style = scene.solution, scene.style
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     contact = solution.problem.contact
-    several = len(contact) > 1
+    several, largest = len(contact) > 1, NO_PRESSURE * solution.pressure.max()
+    free = [k for k, one in enumerate(solution.pairs) if one.pressure.max(initial=0) < largest]
     for pair, rows, s in scene.lines:
+        if pair in free:
+            continue
         colour, mark = colour_and_mark(pair)
         active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
         title = f"pair {pair}: {contact[pair].secondary}" if several else None
@@ -431,6 +435,9 @@ def _draw_pressure(axes: Axes, scene: Scene, part: Array) -> None:
     for state, fill, name in states if several else ():
         if state.any():
             axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
+    if free:
+        others = f"pair{'s' * (len(free) > 1)} {', '.join(map(str, free))}"
+        axes.plot([], [], " ", label=f"without pressure:\n{others}")
     if np.ptp(part) > 0:
         axes.set_xlim(*part / length)
     arcs = [pair.direction is None for pair in contact]
@@ -461,3 +468,78 @@ def finish_pressures(axes: Axes, style: Style, part: Array, names: Iterable[str]
     axes.set_ylabel(style.title("contact pressure", "stress"))
     axes.ticklabel_format(**POWERS)
     axes.grid(alpha=0.3)
+
+
+def slope_triangle(axes: Axes, x: Array, y: Array, rate: float) -> None:
+    """A triangle of the slope -`rate` below the end of a curve `x`, `y` (k,), both logarithmic."""
+    right, end = float(x[-1]), TRIANGLE_DEPTH * float(y[-1])
+    left, start = right / TRIANGLE_SPAN, end * TRIANGLE_SPAN**rate
+    axes.plot([left, right, left, left], [start, end, end, start], color="0.4", lw=0.8)
+    beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "0.3"}
+    for text, place, offset, ha, va in (
+        (f"{rate:g}", (left, np.sqrt(end * start)), (-3, 0), "right", "center"),
+        ("1", (np.sqrt(left * right), end), (0, -2), "center", "top"),
+    ):
+        axes.annotate(text, place, xytext=offset, ha=ha, va=va, **beside)
+
+
+def plot_convergence(
+    runs: Mapping[str, Run] | Sequence[Guaranteed],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    rates: Mapping[str, float] | None = None,
+) -> Figure:
+    """Relative errors over unknowns, with a triangle of the optimal rate under each curve.
+
+    Parameters
+    ----------
+    runs : mapping or sequence of Solution
+        By label: levels of `adapt` or solutions on finer and finer meshes, drawn by their error
+        estimates and, where they have been made, guaranteed bounds (dashed); or two arrays,
+        unknowns (k,) and relative errors (k,). One run may be given as it is.
+    path : path, optional
+        File (.png); without one the picture is shown on the screen.
+    rates : mapping, optional
+        Rates of the triangles by label. Default: order / 2 of solutions, no triangle for arrays.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib.
+
+    Raises
+    ------
+    ValueError, OSError
+        An empty run, a rate without a run, a path that cannot be written.
+    """
+    named = {str(k): run for k, run in runs.items()} if isinstance(runs, Mapping) else {"": runs}
+    if unknown := set(rates or {}) - set(named):
+        raise ValueError(f"rates: no run is called {', '.join(sorted(unknown))}")
+    for label, run in named.items():
+        if len(run[0] if isinstance(run, tuple) else run) == 0:
+            raise ValueError(f'run "{label}" is empty')
+    target = None if path is None else check_path(path, ".png")
+    figure = new_figure(target, figsize=(6.5, 5))
+    axes = figure.subplots()
+    for k, (label, run) in enumerate(named.items()):
+        name, rate, colour, mark = label, (rates or {}).get(label), *colour_and_mark(k)
+        style: dict[str, Any] = {"color": colour, "marker": mark, "ms": 4}
+        if isinstance(run, tuple):
+            x, y = (np.asarray(values, dtype=float) for values in run)
+        else:
+            order = run[-1].order
+            name, rate = label or f"estimate, order {order}", order / 2 if rate is None else rate
+            sizes = [level.displacement.space.ndof for level in run]
+            levels = list(zip(sizes, run, strict=True))
+            x, y = np.transpose([(n, level.relative_error_estimate) for n, level in levels])
+            if bound := [(n, one.relative_error_bound) for n, one in levels if one.bounded]:
+                bound_name = f"{label}, bound".lstrip(", ")
+                axes.plot(*np.transpose(bound), ls="--", mfc="w", label=bound_name, **style)
+        axes.plot(x, y, label=name, **style)
+        if rate is not None:
+            slope_triangle(axes, x, y, rate)
+    axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="relative error, energy norm")
+    axes.grid(which="major", alpha=0.3)
+    axes.legend()
+    show(figure, target)
+    return figure

@@ -213,9 +213,8 @@ def _draw_bodies(
         parts[name].set_axis_off()
         parts[name].set_title(title)
     there = [parts[name] for name in "bc" if name in parts]
-    extremes = float(values.min()), float(values.max())
     shading = ScalarMappable(Normalize(*limits), colours)
-    colour_bar(figure, shading, there, style.title(shown.label, shown.kind), extremes)
+    colour_bar(figure, shading, there, style.title(shown.label, shown.kind), values)
     for axes in there:
         axes.set_anchor("C")
 
@@ -281,8 +280,7 @@ def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: s
     axes.set(aspect="equal", xlim=ends[0], ylim=ends[1], xlabel=x, ylabel=y)
     axes.set_title(f"pressure on {name}")
     axes.ticklabel_format(**POWERS)
-    label, extremes = style.title("contact pressure", "stress"), (float(values.min()), top)
-    colour_bar(figure, shading, [axes], label, extremes)
+    colour_bar(figure, shading, [axes], style.title("contact pressure", "stress"), values)
 
 
 def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
@@ -307,4 +305,6 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
     part = np.array([min(ends), max(ends)])
     finish_pressures(axes, style, part, dict.fromkeys(names))
     axes.set(xlim=part / length, title="contact pressure along the cuts")
+    if not (data["pressure"].any() or style.profile):
+        axes.set_yticks([0.0])
     axes.legend()

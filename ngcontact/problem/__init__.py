@@ -16,9 +16,9 @@ from .mesh_arrays import bisect as bisect
 from .mesh_arrays import move_vertices as move_vertices
 from .mesh_arrays import on_axis as on_axis
 from .problem import Problem as Problem
-from .strain import strain_components as strain_components
 from .values import body_mask as body_mask
 from .values import boundary_mask as boundary_mask
 from .values import numbers as numbers
 from .values import region_mask as region_mask
 from .values import scalar_data as scalar_data
+from .values import strain_components as strain_components

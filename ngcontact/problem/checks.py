@@ -18,7 +18,7 @@ from netgen.occ import OCCGeometry, TopoDS_Shape
 
 from ..arrays import Array, Index, Mask
 from .mesh_arrays import POSITION, MeshArrays, on_axis
-from .values import body_mask, boundary_mask, refuse_where
+from .values import SYMMETRIC, body_mask, boundary_mask, refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
 Masks: TypeAlias = dict[str, Mask]
@@ -361,6 +361,35 @@ def _of_coordinates(points: Array, gap: Callable[..., Any], label: str, dim: int
             "return one value per point"
         )
     return values
+
+
+def check_strains(
+    view: MeshArrays,
+    masks: Masks,
+    strains: Iterable[ng.CoefficientFunction],
+    plane: Masks,
+) -> None:
+    """Refuse strains that are not symmetric, or whose stress the law does not determine.
+
+    A general law in the plane does not say how strains normal to it act in plane strain: `plane`
+    (r,) are the masks of such laws, `masks` (r,) those of `strains`, as of `strain_data`.
+    """
+    for (label, mask), data in zip(masks.items(), strains, strict=True):
+        if data.dim >= 4:
+            d = int(data.dims[0])
+            every = view.mesh.MapToAllElements(ELEMENT_RULES[view.dim], ng.VOL)
+            points = every[mask[view.bodies][every["nr"]]]
+            values = data(points).reshape(-1, d, d)
+            skew = np.abs(values - values.transpose(0, 2, 1)).max(axis=(1, 2))
+            bad = skew > SYMMETRIC * np.abs(values).max(initial=0.0)
+            refuse_where(points, bad, data(points), label, "a strain is symmetric, xy = yx")
+        for body, where in plane.items() if data.dim in (1, 3) else ():
+            if (mask & where).any():
+                raise ValueError(
+                    f"{label} has a part normal to the plane, and the 3x3 law of {body} does not "
+                    "tell what that does in plane strain: give the pair (xx, yy) of strains in the "
+                    "plane that leave it without stress"
+                )
 
 
 def check_about_axis(

@@ -15,6 +15,23 @@ import numpy as np
 SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
 TUPLES = {2: "a pair", 3: "a triple"}  # of components, by the dimension
 
+STRAINS = {
+    2: "give a number, which acts in all three directions, a pair (xx, yy), a triple (xx, yy, zz), "
+    "about an axis (rr, zz, hoop), or a symmetric matrix (2, 2)",
+    3: "give a number, which acts in all three directions, a triple (xx, yy, zz), or a symmetric "
+    "matrix (3, 3)",
+}
+STRAIN_SHAPES = {2: [(), (1,), (2,), (3,), (2, 2)], 3: [(), (1,), (3,), (3, 3)]}
+# Components of an initial strain, xx, yy, the one normal to the plane, the engineering shear
+# gamma_xy, and of solids gamma_yz, gamma_xz, by the places of their parts in the data of a size.
+STRAIN_PLACES = {
+    1: [[0], [0], [0], [], [], []],
+    2: [[0], [1], [], [], [], []],
+    3: [[0], [1], [2], [], [], []],
+    4: [[0], [3], [], [1, 2], [], []],
+    9: [[0], [4], [8], [1, 3], [5, 7], [2, 6]],
+}
+
 Scalar: TypeAlias = float | ng.CoefficientFunction
 Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction
 
@@ -151,6 +168,35 @@ def traction_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
     if vector or (isinstance(value, ng.CoefficientFunction) and value.dim != 1):
         return vector_data(value, what, dim)
     return ng.CF(scalar_data(value, what))
+
+
+def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
+    """A strain as it was given, a scalar, (2,), (3,) or a matrix, for `strain_components`."""
+    right = STRAINS[dim]
+    if isinstance(value, ng.CoefficientFunction):
+        if tuple(value.dims) not in STRAIN_SHAPES[dim]:
+            dims = tuple(value.dims)
+            raise ValueError(f"{what} is a CoefficientFunction of dims {dims}: {right}")
+        if value.is_complex:
+            raise TypeError(f"{what} is a complex CoefficientFunction: it must be real")
+        return value
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        return ng.CF(scalar_data(value, what))
+    rows = [list(row) if isinstance(row, Sequence | np.ndarray) else [row] for row in value]
+    columns = {len(row) for row in rows}
+    scalars = not any(isinstance(row, Sequence | np.ndarray) for row in value)
+    shape = (len(rows),) if scalars else (len(rows), *columns)
+    if shape not in STRAIN_SHAPES[dim] or shape == (1,):
+        raise ValueError(f"{what} = {value!r}: {right}")
+    entries = tuple(scalar_data(entry, what) for row in rows for entry in row)
+    return ng.CF(entries, dims=shape) if len(shape) == 2 else ng.CF(entries)
+
+
+def strain_components(data: ng.CoefficientFunction) -> ng.CoefficientFunction:
+    """Components (6,) of `strain_data`, by a product: functions are looked for once at a point."""
+    size = data.dim
+    parts = (float(k in places) for places in STRAIN_PLACES[size] for k in range(size))
+    return ng.CF(tuple(parts), dims=(6, size)) * data.Reshape((size,))
 
 
 def region_pattern(value: Any) -> str | None:

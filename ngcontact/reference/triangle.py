@@ -11,6 +11,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from scipy.spatial import Delaunay
 from scipy.special import factorial, roots_jacobi
 
 from ..arrays import Array, Index
@@ -38,13 +39,8 @@ def edge_nodes(order: int) -> Index:
 @lru_cache
 def parts(order: int) -> Index:
     """Nodes (t, 3) at the corners of the t = order^2 triangles into which the nodes divide one."""
-    divided = {
-        1: [[0, 1, 2]],
-        2: [[0, 5, 3], [1, 4, 5], [2, 3, 4], [5, 4, 3]],
-        3: [[0, 7, 4], [1, 5, 8], [2, 3, 6]]
-        + [[9, a, b] for a, b in ((7, 8), (8, 5), (5, 6), (6, 3), (3, 4), (4, 7))],
-    }
-    return np.array(divided[order])
+    corners = np.array([[0, 0], [1, 0], [0.5, 0.75**0.5]])  # no other division has such circles
+    return Delaunay(nodes(order) @ corners).simplices
 
 
 @lru_cache

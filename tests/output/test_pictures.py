@@ -217,7 +217,7 @@ def test_without_contact_there_is_no_pressure_to_draw(tmp_path):
 
 
 @pytest.mark.parametrize("move", [-0.1, 0.3])
-def test_bodies_that_do_not_touch_are_drawn_apart_and_without_the_colours_of_round_off(move):
+def test_bodies_apart_are_drawn_apart_without_the_colours_of_round_off(tmp_path, move):
     """One moves by half of the gap, or away by more: twice as near it would show contact."""
     problem = Problem(
         geometry=compound(
@@ -232,3 +232,17 @@ def test_bodies_that_do_not_touch_are_drawn_apart_and_without_the_colours_of_rou
     drawn = picture(solution, Style())
     assert drawn.scale == 1
     assert not drawn.values.any()
+    axes = plot_solution(solution, tmp_path / "a.png").axes
+    [pressure] = [one for one in axes if one.get_title() == "contact pressure"]
+    assert [list(one.get_yticks()) for one in (pressure, axes[-1])] == [[0.0], [0.0]]  # no scale
+
+
+def test_pairs_without_pressure_are_named(tmp_path):
+    """As of a bearing's rollers, most of which carry nothing."""
+    problem = disc().problem
+    pairs = [*problem.contact, Contact("side", gap=1.0)]
+    solution = solve(replace(problem, contact=pairs), maxh=0.4, order=2)
+    figure = plot_solution(solution, tmp_path / "a.png")
+    [profile] = [axes for axes in figure.axes if axes.get_title() == "contact pressure"]
+    labels = [text.get_text() for text in profile.get_legend().get_texts()]
+    assert labels == ["pair 0: disc_arc", "in contact", "open", "without pressure:\npair 1"]
