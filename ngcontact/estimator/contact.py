@@ -17,6 +17,7 @@ from ..contact import (
     ContactState,
     FacingPieces,
     facing_pieces,
+    interpolated_rays,
     jacobian,
     opposite,
     prescribed_gap,
@@ -24,6 +25,7 @@ from ..contact import (
 )
 from ..fem import BoundaryTrace
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
+from ..reference import triangle
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,
@@ -399,3 +401,81 @@ def _gap_squares(
     closed = np.maximum(pressure, 0) * opening  # (3.12), (3.12')
     # (3.9), (3.9')
     return np.where(full, np.minimum(closed, cost(opening)), closed), cost(depth, or_more=True)
+
+
+def discrete_pressure(trace: BoundaryTrace, pair: ContactState, local: Index, s: Array) -> Array:
+    """The pressure (k,) that the forces stand for, at `s` (k, 3) of facets `local` (k,) of a zone.
+
+    At order 2 linear through the middles of edges, with Bernstein's polynomials where vertices have
+    rows, too.
+    """
+    value = pair.line.on_segments(pair.force / pair.line.weight, 0.0)
+    if trace.order != 2:
+        return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
+    edges = value[:, 3:]
+    beside = 3 - triangle.EDGES.sum(axis=1)  # the vertex that an edge has not
+    # At a vertex the sum of its two edges less the third.
+    linear = (1.0 - 2.0 * np.eye(3)[:, beside]) @ edges.T
+    has = pair.line.rows[:, :3] >= 0
+    value[:, :3] = np.where(has, value[:, :3], linear.T)
+    shapes = triangle.lagrange(2, s)
+    by_edges = (1 - 2 * s[:, beside]) * edges[local]
+    quadratic = np.einsum("ki,ij,kj->k", shapes, triangle.bernstein(2), value[local])
+    return np.where(has[local].any(axis=1), quadratic, by_edges.sum(axis=1))
+
+
+def on_surfaces(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:
+    """Terms of one pair of solids, and the facets (j,) of both bodies that face each other.
+
+    Where all rows of a facet are active both bodies have one pressure, and half the jump of their
+    tractions counts; elsewhere the difference from the discrete forces. Gaps count where they are
+    negative, and where they are open under pressure.
+    """
+    trace, zone = solution.boundary, pair.line
+    parts, _ = facing_pieces(trace, zone, np.asarray((zone.rows >= 0).any(axis=1)))
+    places, w = triangle.gauss(2 * solution.order)
+    each = rows_of(parts, np.arange(len(parts.local)).repeat(len(places)))
+    local, facing = each.local, each.facing
+    facet, s = zone.segments[local], parts.places(places)
+    size, seen = trace.surface_element(facet, s), jacobian(trace, zone.contact, facet, s)
+    weight = seen * (parts.share[:, None] * w).ravel()  # across a fixed direction
+    d = interpolated_rays(trace, zone.contact, zone.segments, local, s)
+    pi = discrete_pressure(trace, pair, local, s) / solution.unit
+    active, has = zone.on_segments(pair.active, False), zone.rows >= 0
+    full = np.asarray((active | ~has).all(axis=1) & has.any(axis=1))[local]
+    u = trace.evaluate(solution.displacement, facet, s)
+    sides = [(trace.element[facet], solution.traction(facet, s) * (size / seen)[:, None], 1.0)]
+    x, distance, shared = trace.point(facet, s), np.zeros(len(pi)), np.zeros_like(full)
+    if zone.contact.primary is not None:
+        there, distance = opposite(trace, x, d, facing, each.opposite)
+        met = np.isfinite(distance)
+        weight, distance = weight * met, np.where(met, distance, 0.0)
+        across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
+        u = u - trace.evaluate(solution.displacement, facing, there)
+        other = solution.traction(facing, there) / across[:, None]
+        sides.append((trace.element[facing], other, -1.0))
+        shared = full
+    if zone.contact.gap is not None:
+        distance = prescribed_gap(zone.contact, trace, facet, s, x)
+    gap = (distance - (u * d).sum(axis=1)) / solution.strain
+    half_jump = sum((t * d).sum(axis=1) for _, t, _ in sides) / 2
+    least = np.min([solution.edge_weight[e] for e, _, _ in sides], axis=0)
+    stiff = np.min([solution.mu[e] / solution.diameter[e] for e, _, _ in sides], axis=0)
+    closing, product = stiff * gap**2, np.maximum(pi, 0.0) * np.maximum(gap, 0.0) / 2
+    product, depth = np.where(full, np.minimum(product, closing), product), closing * (gap < 0)
+    if zone.contact.bilateral:
+        depth, product = closing, np.zeros(len(gap))
+    terms, share = BoundaryTerms(), weight / len(sides)
+    for e, t, sign in sides:
+        own_weight, along = solution.edge_weight[e], (t * d).sum(axis=1)
+        values = np.where(shared, half_jump, sign * along + pi)[:, None]
+        factor = np.where(shared, least, own_weight) * weight
+        shear = t - along[:, None] * d
+        terms += [
+            BoundaryResidual("pressure", e, factor, values, []),
+            BoundaryResidual("tangential", e, own_weight * weight, shear, []),
+            Squares("penetration", e, depth * share),
+            Squares("complementarity", e, product * share),
+        ]
+    covered = np.concatenate([zone.segments[parts.local], parts.facing[parts.facing >= 0]])
+    return terms, covered

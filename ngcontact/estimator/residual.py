@@ -51,15 +51,13 @@ from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
 from ..quadrature import features_of, loads_of, pieces, rough_segments
 from ..solved import Solved
-from .contact import between_nodes, closing_energy, on_contact, remaining
+from .contact import between_nodes, closing_energy, on_contact, on_surfaces, remaining
 from .pressure_correction import pressure_correction
-from .surfaces import surface_terms
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,
     BoundaryResidual,
     BoundaryTerms,
-    Parts,
     PressureShare,
     ScaledSolution,
     Squares,
@@ -141,12 +139,13 @@ def _project_by_compliance(
     projected.vec.FV().NumPy().reshape(-1, 3)[free] = values.reshape(3, -1).T[free]
 
 
-def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTerms:
-    """Residuals on the `parts` of the boundary that no body faces."""
-    boundary, problem = solution.boundary, solution.problem
-    _, (segment, s, weight) = parts.points(2 * solution.order + DATA_BONUS)
-    ds = boundary.surface_element(segment, s) * weight
+def on_supports_and_loads(solution: ScaledSolution, points: BoundaryPoints) -> BoundaryTerms:
+    """Residuals at `points` of the boundary that no body faces.
 
+    Of solids data are not looked at between them.
+    """
+    boundary, problem, (segment, s, ds) = solution.boundary, solution.problem, points
+    plane = problem.dim == 2
     residual = -solution.traction(segment, s)  # (3.7)
     for pattern in problem.traction:
         at, load = boundary.lies_on(segment, pattern), problem.traction_vector(pattern)
@@ -158,13 +157,18 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
         given = {axis: value for axis, value in enumerate(data) if value is not None}
         for axis in given:
             residual[at, axis] = factor[at, axis] = 0.0
-        squares.append(_displacement(solution, boundary.segments(pattern), given))
+        if plane:
+            squares.append(_displacement(solution, boundary.segments(pattern), given))
+        else:
+            squares.append(_displacement_at(solution, points.some(at), given))
     guided = np.zeros(len(segment), dtype=bool)
     if problem.guide is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, problem.guide)
-        points = BoundaryPoints(segment[guided], s[guided], ds[guided])
-        normal, off_guide = _off_guide(solution, points, problem.guide)
-        squares.append(off_guide)
+        if plane:
+            normal, off_guide = _off_guide(solution, points.some(guided), problem.guide)
+            squares.append(off_guide)
+        else:
+            normal = boundary.normal(segment[guided], s[guided])
         for vector in (residual, factor):
             along = (vector[guided] * normal).sum(axis=1)
             vector[guided] -= along[:, None] * normal
@@ -236,6 +240,18 @@ def _displacement(
     return Squares("displacement", element, 2 * solution.rigidity[element] * worst)
 
 
+def _displacement_at(
+    solution: ScaledSolution, points: BoundaryPoints, data: dict[int, ng.CoefficientFunction]
+) -> Squares:
+    """2 mu |u_D - u_h|^2 / h at `points`, with u_D, `data` by component."""
+    boundary, (segment, s, ds) = solution.boundary, points
+    u, element = boundary.evaluate(solution.displacement, segment, s), boundary.element[segment]
+    missed = [u[:, k] - boundary.evaluate(f, segment, s)[:, 0] for k, f in data.items()]
+    square = ((np.array(missed) / solution.strain) ** 2).sum(axis=0)
+    weight = 2 * solution.mu[element] / solution.diameter[element]
+    return Squares("displacement", element, weight * ds * square)
+
+
 def _off_guide(
     solution: ScaledSolution, points: BoundaryPoints, guide: str
 ) -> tuple[Array, Squares]:
@@ -273,13 +289,24 @@ def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> E
     """Residual estimate; pressures of bodies are corrected from that kappa / mu on."""
     pairs, boundary = solved.pairs, solved.discrete.space.trace
     solution = scaled(solved)
+    order = 2 * solution.order + DATA_BONUS
     if solved.problem.dim == 3:
-        terms, corrected_from = surface_terms(solution, pairs), math.inf
+        terms, corrected_from = BoundaryTerms(), math.inf
+        outer = ~boundary.inner
+        for pair in pairs:
+            on_pair, covered = on_surfaces(solution, pair)
+            terms += on_pair
+            outer[covered] = False
+        places, rule = boundary.rule(order)
+        segment, s = boundary.at_places(np.flatnonzero(outer), places)
+        weight = np.tile(rule, len(segment) // len(rule))
     else:
         of_pairs = [on_contact(solution, pair, pairs) for pair in pairs]
         terms = [term for on_pair, _ in of_pairs for term in on_pair]
         rest = remaining(boundary.inner | boundary.on_axis, [covered for _, covered in of_pairs])
-        terms += on_supports_and_loads(solution, rest)
+        _, (segment, s, weight) = rest.points(order)
+    points = BoundaryPoints(segment, s, weight * boundary.surface_element(segment, s))
+    terms += on_supports_and_loads(solution, points)
     parts = _squares(solution, terms, corrected_from)
     total = np.sum(list(parts.values()), axis=0)
     unit = solution.unit / math.sqrt(solution.modulus)  # of the energy norm

@@ -25,6 +25,10 @@ class BoundaryPoints(NamedTuple):
     s: Array  # (k,), parameters on them, on facets (k, 3)
     weight: Array  # (k,)
 
+    def some(self, at: Mask) -> BoundaryPoints:
+        """Those `at` (k,)."""
+        return BoundaryPoints(self.segment[at], self.s[at], self.weight[at])
+
 
 @dataclass(frozen=True, eq=False)
 class Parts:
