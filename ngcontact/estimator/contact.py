@@ -35,6 +35,7 @@ from .terms import (
     PressureShare,
     ScaledSolution,
     Squares,
+    fine_parts,
 )
 
 # Last step of Newton's method for a parameter: the next one would be its square.
@@ -45,8 +46,6 @@ SAME_DIRECTION_COSINE = 1 - 1e-6
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas.
 BUMP_FACTOR = 2.0
-# Parts of a line by which gaps that are functions are integrated: of 60 waves each has four.
-GAP_PIECES = 256
 
 
 def covered_parts(
@@ -89,14 +88,13 @@ def remaining(inner: Mask, covered: list[Parts]) -> Parts:
 def as_fine_as_gap(
     boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces
 ) -> FacingPieces:
-    """Pieces no longer than a `GAP_PIECES`-th of all, where the gap is a function."""
+    """Parts of the pieces, as of `fine_parts`, where the gap is a function."""
     if line.contact.gap is None or isinstance(line.contact.gap, float):
         return pieces
     size = boundary.lengths(line.segments)[pieces.local] * pieces.share
-    count = np.ceil(GAP_PIECES * size / size.sum()).astype(np.intp)
-    last, share = np.cumsum(count), (pieces.share / count).repeat(count)
-    pieces = rows_of(pieces, np.arange(len(count)).repeat(count))
-    start = pieces.start + share * (np.arange(last[-1]) - (last - count).repeat(count))
+    number, start, length = fine_parts(size, np.ones(len(size), dtype=bool))
+    pieces = rows_of(pieces, number)
+    start, share = pieces.start + pieces.share * start, pieces.share * length
     return replace(pieces, corners=np.stack([start, start + share], axis=1), share=share)
 
 

@@ -16,6 +16,7 @@ from ..problem import Problem
 
 VOIGT = {3: ((0, 2), (2, 1)), 6: ((0, 5, 4), (5, 1, 3), (4, 3, 2))}  # numbers, by components
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
+LINE_PARTS = 256  # of a line, by which functions on it are integrated: of 60 waves each has four
 
 
 class BoundaryPoints(NamedTuple):
@@ -45,6 +46,17 @@ class Parts:
         length = (self.stop - self.start)[:, None]
         s, weights = self.start[:, None] + length * rule, length * weight
         return part, BoundaryPoints(self.segment[part], s.ravel(), weights.ravel())
+
+
+def fine_parts(size: Array, some: Mask) -> tuple[Index, Array, Array]:
+    """Parts of segments of sizes (k,): `some` (k,) in equal ones, up to a `LINE_PARTS`-th of these.
+
+    The number (n,) of its segment, the start (n,) and the length (n,) of each on it; others whole.
+    """
+    count = np.where(some, np.ceil(LINE_PARTS * size / size[some].sum()), 1).astype(np.intp)
+    last, number = np.cumsum(count), np.arange(len(count)).repeat(count)
+    start = np.arange(last[-1]) - (last - count)[number]
+    return number, start / count[number], 1 / count[number]
 
 
 class PressureShare(NamedTuple):
