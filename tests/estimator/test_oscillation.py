@@ -161,20 +161,17 @@ def test_effectivity_towards_incompressibility(nu, order):
 
 
 @pytest.mark.filterwarnings("ignore:body .* nearly incompressible")
-@pytest.mark.parametrize(
-    ("nu", "order", "most"),
-    [(0.4999, 1, 2.5), (0.4999, 2, 2.5), (0.499999, 3, 2.5), (0.499999, 4, 6.0)],
-)
-def test_guides_hold_what_is_nearly_incompressible(nu, order, most):
-    """A ring in its bearing: measured 1.67, 2.24, 1.83, 3.7.
+@pytest.mark.parametrize(("nu", "order"), [(0.4999, 1), (0.4999, 2), (0.499999, 3), (0.499999, 4)])
+def test_guides_hold_what_is_nearly_incompressible(nu, order):
+    """A ring in its bearing: measured 1.67, 2.24, 1.83, 2.20.
 
-    If guides of order 1 held nothing 3.7; with tractions of the stress itself, not of polynomials,
+    At order 4 3.7 where curved elements were integrated as straight ones. If guides of order 1 held nothing 3.7; with tractions of the stress itself, not of polynomials,
     430 and 330 at orders 3 and 4.
     """
     law, case = Elastic(E=1.0, nu=nu), cases.ring_in_bearing()
     solution = solve(replace(case.problem, materials={"ring": law}), maxh=0.15, order=order)
     error, _ = energy_error(solution, bearing(law, radii=(0.5, 1.0)))
-    assert 1 <= solution.error_estimate / error <= most
+    assert 1 <= solution.error_estimate / error <= 2.5
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
