@@ -410,16 +410,12 @@ def discrete_pressure(trace: BoundaryTrace, pair: ContactState, local: Index, s:
     value = pair.line.on_segments(pair.force / pair.line.weight, 0.0)
     if trace.order != 2:
         return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
-    edges = value[:, 3:]
-    beside = 3 - triangle.EDGES.sum(axis=1)  # the vertex that an edge has not
-    # At a vertex the sum of its two edges less the third.
-    linear = (1.0 - 2.0 * np.eye(3)[:, beside]) @ edges.T
+    linear = np.linalg.solve(triangle.nodes(2)[3:], value[:, 3:].T).T  # at the vertices
     has = pair.line.rows[:, :3] >= 0
-    value[:, :3] = np.where(has, value[:, :3], linear.T)
+    value[:, :3] = np.where(has, value[:, :3], linear)
     shapes = triangle.lagrange(2, s)
-    by_edges = (1 - 2 * s[:, beside]) * edges[local]
     quadratic = np.einsum("ki,ij,kj->k", shapes, triangle.bernstein(2), value[local])
-    return np.where(has[local].any(axis=1), quadratic, by_edges.sum(axis=1))
+    return np.where(has[local].any(axis=1), quadratic, (s * linear[local]).sum(axis=1))
 
 
 def on_surfaces(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:

@@ -165,8 +165,9 @@ def test_effectivity_towards_incompressibility(nu, order):
 def test_guides_hold_what_is_nearly_incompressible(nu, order):
     """A ring in its bearing: measured 1.67, 2.24, 1.83, 2.20.
 
-    At order 4 3.7 where curved elements were integrated as straight ones. If guides of order 1 held nothing 3.7; with tractions of the stress itself, not of polynomials,
-    430 and 330 at orders 3 and 4.
+    At order 4 3.7 where curved elements were integrated as straight ones. If guides of order 1 held
+    nothing 3.7; with tractions of the stress itself, not of polynomials, 430 and 330 at orders 3
+    and 4.
     """
     law, case = Elastic(E=1.0, nu=nu), cases.ring_in_bearing()
     solution = solve(replace(case.problem, materials={"ring": law}), maxh=0.15, order=order)
