@@ -98,10 +98,10 @@ def pressure_correction(
         k += weighted(held * product) * ng.ds(definedon=mesh.Boundaries(pattern))
     for form in (a, f, b, k):
         form.Assemble()
-    R = sp.vstack([_on_boundary(solution, pressures, term) for term in terms], "csr")
+    every = [_on_boundary(solution, pressures, term) for term in terms]
+    R = sp.vstack(every, "csr")
     weight = np.concatenate([np.repeat(x.weight, x.residual.shape[1]) for x in terms])
     residual = np.concatenate([x.residual.ravel() for x in terms])
-    ends = np.cumsum([x.residual.size for x in terms])
     A, B, K = shared(a.mat) + R.T @ R.multiply(weight[:, None]), shared(b.mat), shared(k.mat)
     # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a factorisation
     # without pivots.
@@ -117,8 +117,8 @@ def pressure_correction(
         divergence=ng.Grad(delta),
         jump=(delta - delta.Other()) * n,
         on_boundary=[
-            change.reshape(term.residual.shape)
-            for change, term in zip(np.split(R @ found[:size], ends[:-1]), terms, strict=True)
+            (one @ found[:size]).reshape(term.residual.shape)
+            for one, term in zip(every, terms, strict=True)
         ],
         squares=np.asarray(ng.Integrate(density, region, element_wise=True)),
     )

@@ -49,7 +49,7 @@ class Parts:
 
 
 def fine_parts(size: Array, some: Mask) -> tuple[Index, Array, Array]:
-    """Parts of segments of sizes (k,): `some` (k,) in equal ones, up to a `LINE_PARTS`-th of these.
+    """Parts of segments: `some` (k,) in equal ones, by `size` (k,), up to a `LINE_PARTS`-th of all.
 
     The number (n,) of its segment, the start (n,) and the length (n,) of each on it; others whole.
     """

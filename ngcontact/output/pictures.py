@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array, Index
-from ..estimator import Guaranteed
 from ..solved import Solved
 from .files import check_path, replacing
 from .scene import Scene, Style, coordinates, picture
@@ -57,7 +56,7 @@ TRIANGLE_SPAN = 2.5  # of a triangle's side along the unknowns
 TRIANGLE_DEPTH = 0.6  # of the curve, where a triangle lies
 
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
-Run = Sequence[Guaranteed] | tuple[Any, Any]
+Run = Sequence[Any] | tuple[Any, Any]  # solutions, or unknowns and errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,7 +352,7 @@ def _draw_windows(
 
 
 def colour_bar(figure: Figure, shading: Any, axes: list[Axes], label: str, values: Array) -> None:
-    """Colour bar; arrows and numbers tell the least and the largest of `values` beyond its ends."""
+    """Colour bar; arrows and numbers tell what of `values` (k,) lies beyond its ends."""
     least, most, (low, high) = float(values.min()), float(values.max()), shading.get_clim()
     below, above = least < low, most > high
     extend = ("neither", "min", "max", "both")[below + 2 * above]
@@ -484,7 +483,7 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float) -> None:
 
 
 def plot_convergence(
-    runs: Mapping[str, Run] | Sequence[Guaranteed],
+    runs: Mapping[str, Run] | Run,
     path: str | os.PathLike[str] | None = None,
     *,
     rates: Mapping[str, float] | None = None,
