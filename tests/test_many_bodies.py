@@ -8,9 +8,12 @@ import pytest
 from netgen.occ import ArcOfCircle, Pnt
 
 from ngcontact import Contact, Elastic, Problem, adapt, find_contacts, solve
-from ngcontact.contact import by_line
+from ngcontact.arrays import by_field, dense
+from ngcontact.contact import by_line, contact_line, lines_together
 from ngcontact.discrete import carried_active_set
+from ngcontact.fem import boundary_trace
 from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.mesh import first_mesh
 from tests.given_meshes import mesh_of
 
 ROLLERS, RADIUS, RACE, THICKNESS = 12, 0.2, 1.0, 0.3
@@ -156,3 +159,23 @@ def test_a_plate_one_element_thick_between_two_blocks(order, thickness):
         np.testing.assert_allclose(one, -other, atol=1e-10 * np.abs(one).max())
         energies.append(solution.energy)
     assert energies[0] == pytest.approx(energies[1], rel=6e-3)
+
+
+def test_lines_found_at_once_are_those_found_alone():
+    geometry = bearing()
+    pairs = find_contacts(geometry, within=1e-3)[:12]
+    assert len({pair.primary for pair in pairs}) == 1
+    mesh = first_mesh(Problem(geometry, {".*": Elastic(E=1, nu=0.3)}, contact=pairs), 0.2)
+    mesh.Curve(2)
+    trace = boundary_trace(mesh, 2)
+    for pair, line in zip(pairs, lines_together(trace, pairs), strict=True):
+        alone = contact_line(trace, pair)
+        assert line.contact == pair
+        for name, value in by_field(alone).items():
+            if name not in ("contact", "searches"):
+                one, other = (dense(x).astype(float) for x in (value, getattr(line, name)))
+                # To round-off; measured 0.
+                assert np.abs(one - other).max() <= 1e-12 * np.abs(one).max(), name
+    away = [pairs[0], replace(pairs[1], secondary="roller7_out")]
+    with pytest.raises(ValueError, match=r'no point of the secondary "roller7_out" faces'):
+        lines_together(trace, away)

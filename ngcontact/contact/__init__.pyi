@@ -1,5 +1,6 @@
 from .dual import contact_line as contact_line
 from .dual import for_partial_cover as for_partial_cover
+from .dual import lines_together as lines_together
 from .end_curves import area_in_contact as area_in_contact
 from .end_curves import curves_at_ends as curves_at_ends
 from .end_curves import signed_distance as signed_distance

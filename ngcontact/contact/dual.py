@@ -361,10 +361,40 @@ def contact_line(
         No point of the secondary faces the primary.
     """
     contact = with_roles(trace, contact)
+    line, carries = _points_of_rows(trace, contact, taken, held)
+    return _carrying(line, carries)
+
+
+def lines_together(trace: BoundaryTrace, contacts: Sequence[Contact]) -> list[ContactLine]:
+    """Contact points of pairs that differ in their secondaries alone, which have no common nodes.
+
+    As `contact_line` has them of each, found at once: each step costs what it costs of one pair.
+    """
+    every = replace(contacts[0], secondary="|".join(contact.secondary for contact in contacts))
+    line, carries = _points_of_rows(trace, every)
+    found = []
+    for contact in contacts:
+        own = trace.lies_on(line.segments, contact.secondary)
+        part = replace(rows_of(line, own, *ContactLine.by_segment), contact=contact)
+        others = np.ones(len(carries) + 1, dtype=bool)
+        others[part.rows] = False
+        found.append(_carrying(without(part, np.flatnonzero(others[:-1])), carries[~others[:-1]]))
+    return found
+
+
+def _points_of_rows(
+    trace: BoundaryTrace, contact: Contact, taken: Index | None = None, held: Held | None = None
+) -> tuple[ContactLine, Mask]:
+    """Points at all nodes of the secondary, and which (m,) carry rows, as of `contact_line`."""
     line, facing = nodal_line(trace, contact, taken)
     if contact.primary is not None and contact.rows != "nodal":
         line, facing = with_dual_rows(trace, line, facing, held)
-    carries = facing & (line.weight > 0)
+    return line, facing & (line.weight > 0)
+
+
+def _carrying(line: ContactLine, carries: Mask) -> ContactLine:
+    """The line of the points (m,) that carry rows; raise a ValueError where none does."""
+    contact = line.contact
     if len(line.segments) and not carries.any():
         xi = ", ".join(f"{x:.6g}" for x in contact.direction or ())
         raise ValueError(

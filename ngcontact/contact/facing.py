@@ -178,7 +178,7 @@ def divided(
     """
     if trace.model.dim == 3:
         return _clipped(trace, contact, segments, facing, reach)
-    pair = contact.secondary, contact.primary, contact.direction
+    pair = contact.primary, contact.direction
     if pair not in trace.pieces or not np.isin(segments, trace.pieces[pair][0]).all():
         trace.pieces[pair] = segments, _passed(trace, contact, segments, facing)
     known, pieces = trace.pieces[pair]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from types import SimpleNamespace
@@ -15,7 +16,14 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Mask, from_triplets
 from ..constraints import BasisTransformation, Conditions, Rows, held_rows
-from ..contact import ContactLine, ContactState, by_line, contact_line, for_partial_cover
+from ..contact import (
+    ContactLine,
+    ContactState,
+    by_line,
+    contact_line,
+    for_partial_cover,
+    lines_together,
+)
 from ..errors import ConvergenceError
 from ..fem import BoundaryTrace, Space, assemble, boundary_trace, model_of
 from ..linalg import (
@@ -30,7 +38,7 @@ from ..linalg import (
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
-from ..problem import Elastic, Hooke, Problem, varies
+from ..problem import Contact, Elastic, Hooke, Problem, varies
 from ..qp import BorderedSystems, Iterate, QuadraticProgram, SingularError, minimise, no_null_space
 from .admissible_set import (
     AdmissibleSet,
@@ -179,6 +187,28 @@ def same_basis(one: BasisTransformation, other: BasisTransformation) -> bool:
     )
 
 
+def _alone(
+    contacts: Sequence[Contact], trace: BoundaryTrace, alike: Callable[[Contact], Any]
+) -> list[list[int]]:
+    """Numbers of pairs of one primary, `alike`, with no node in common, nor a segment with others.
+
+    As the rollers of a bearing on one of its rings.
+    """
+    groups: dict[Any, list[int]] = defaultdict(list)
+    for number, contact in enumerate(contacts):
+        if contact.roles == "given":
+            groups[contact.primary, alike(contact)].append(number)
+
+    def alone(group: list[int]) -> bool:
+        segments = [trace.segments(contact.secondary) for contact in contacts]
+        own = [segments[number] for number in group]
+        nodes = np.concatenate([np.unique(trace.nodes[some]) for some in own])
+        pairs = np.bincount(np.concatenate(segments))[np.concatenate(own)]
+        return bool((np.bincount(nodes) < 2).all() and (pairs == 1).all())
+
+    return [group for group in groups.values() if len(group) > 1 and alone(group)]
+
+
 def contact_lines(
     problem: Problem,
     trace: BoundaryTrace,
@@ -188,7 +218,7 @@ def contact_lines(
     """The line of each pair with the `conditions` at its nodes, a known one where it is the same.
 
     What an earlier pair of the same direction and gap covers is left to that one where both know
-    the facing segments.
+    the facing segments. Pairs of one primary whose secondaries meet no other are found at once.
     """
 
     def held(line: ContactLine) -> Mask:
@@ -196,7 +226,15 @@ def contact_lines(
 
     sides, others = ("secondary", "primary"), ("direction", "bilateral", "rows", "roles", "gap")
     alike, same, lines = attrgetter(*others), attrgetter(*sides, *others), list[ContactLine]()
+    ready: dict[int, ContactLine] = {}
+    if trace.model.dim == 2 and not known:
+        for group in _alone(problem.contact, trace, alike):
+            of_all = lines_together(trace, [problem.contact[number] for number in group])
+            ready |= zip(group, of_all, strict=True)
     for number, contact in enumerate(problem.contact):
+        if number in ready:
+            lines.append(ready[number])
+            continue
         taken, facing = [np.zeros(0, dtype=np.intp)], trace.segments(contact.primary)
         for earlier, line in zip(problem.contact[:number], lines, strict=True):
             if alike(earlier) != alike(contact):
