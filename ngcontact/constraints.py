@@ -307,10 +307,7 @@ def _in_frames(rows: Rows, supported: _Supported) -> tuple[Entries, Entries]:
 def held_rows(conditions: Conditions, rows: Rows, length: float) -> Mask:
     """Rows (m,) at nodes which `conditions` leave no displacement along their directions.
 
-    Raises
-    ------
-    ValueError
-        Prescribed displacements on both sides violate a row; an overlap as drawn is none here.
+    Prescribed displacements on both sides that violate a row are refused, overlaps as drawn not.
     """
     m, supported = len(rows.node), _supported(conditions, rows)
     e, free = _in_frames(rows, supported)

@@ -353,12 +353,7 @@ def contact_line(
     """Contact points of one pair: at nodes where nodes face nodes, with dual rows elsewhere.
 
     Segments `taken` (j,) of its secondary belong to other pairs. Supports leave the points that are
-    `held` no displacement along their direction.
-
-    Raises
-    ------
-    ValueError
-        No point of the secondary faces the primary.
+    `held` no displacement along their direction. A pair of which no point faces is refused.
     """
     contact = with_roles(trace, contact)
     line, carries = _points_of_rows(trace, contact, taken, held)

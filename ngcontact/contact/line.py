@@ -102,7 +102,7 @@ class ContactLine:
         return pressure
 
 
-Values = TypeVar("Values", Array, Mask)
+Values = TypeVar("Values", Array, Mask, Index)
 
 
 def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:

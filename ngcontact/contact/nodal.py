@@ -94,9 +94,7 @@ def nodal_line(
     facing_points, gap = (found.segment >= 0) | (contact.primary is None), found.distance
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment[first], s[first], position)
-    partner_s = found.s
-    if contact.primary is not None:
-        partner_s = snapped(trace, found.segment, found.s)
+    partner_s = snapped(trace, found.segment, found.s)
     shares = segment_weights(trace, contact, segments)
     if contact.direction is None:  # their components, where two sides share a point
         shares *= (normal * direction[number]).sum(axis=1).reshape(rows.shape)

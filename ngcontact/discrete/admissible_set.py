@@ -74,11 +74,11 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
     """
     mesh, (n, d) = trace.mesh, reaction.shape
     names = np.array(mesh.GetBoundaries())
-    supports: list[tuple[str, Array]] = []  # patterns and directions (k * q, j, d) at their nodes
-    for pattern, components in problem.displacement.items():
-        axes = np.eye(d)[[function is not None for function in components]]
-        count = trace.nodes[trace.segments(pattern)].size
-        supports.append((pattern, np.broadcast_to(axes, (count, *axes.shape))))
+    # Patterns, and directions (j, d) at all of their nodes or (k * q, j, d) at each.
+    supports = [
+        (pattern, np.eye(d)[[function is not None for function in components]])
+        for pattern, components in problem.displacement.items()
+    ]
     if problem.guide is not None:
         number, normal = trace.guide(problem.guide)
         supports.append((problem.guide, normal[number][:, None]))
@@ -87,7 +87,7 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
         segments = trace.segments(pattern)
         node, q = trace.nodes[segments].ravel(), trace.nodes.shape[1]
         size = np.repeat(trace.sizes(segments), q)
-        share = np.einsum("k,kja,kjb->kab", size, directions, directions)
+        share = size[:, None, None] * (np.swapaxes(directions, -1, -2) @ directions)
         np.add.at(held, node, share)
         every.append((pattern, np.repeat(trace.region[segments], q), node, share))
     # The forces size a (a.y) add up to that of the node.
@@ -157,21 +157,17 @@ def _own_weights(lines: list[ContactLine], number: Index, weight: Array) -> Arra
     Of rows of one point, `number` (m,), on one segment the one of the largest `weight` (m,) keeps
     it; pairs of other primaries face another part of the segment, which counts, too.
     """
-    start, found = 0, []
-    for line in lines:
+    found = []
+    for line, own in zip(lines, by_line(lines, np.arange(len(weight))), strict=True):
         at, place = np.nonzero(line.rows >= 0)
         primary = next(j for j, one in enumerate(lines) if _share_primary(one, line))
         group = np.full(len(at), primary)
-        row = start + line.rows[at, place]
-        found.append((row, line.segments[at], group, line.shares[at, place]))
-        start += len(line.node)
+        found.append((own[line.rows[at, place]], line.segments[at], group, line.shares[at, place]))
     row, segment, group, share = (np.concatenate(x) for x in zip(*found, strict=True))
-    order = np.lexsort((row, -weight[row], group, segment, number[row]))
+    order = np.lexsort((row, -weight[row]))
     keys = np.column_stack([number[row], segment, group])[order]
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (keys[1:] != keys[:-1]).any(axis=1)
     kept = np.zeros(len(order), dtype=bool)
-    kept[order] = first
+    kept[order[np.unique(keys, axis=0, return_index=True)[1]]] = True
     whole, own = (np.bincount(row, share * part, len(weight)) for part in (1.0, kept))
     return np.asarray(weight * np.where(whole > 0, own / np.where(whole > 0, whole, 1.0), 1.0))
 

@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Mask, from_triplets
-from ..constraints import BasisTransformation, Conditions, Rows, held_rows
+from ..arrays import Array, Mask, by_field, from_triplets
+from ..constraints import BasisTransformation, Conditions, held_rows
 from ..contact import (
     ContactLine,
     ContactState,
@@ -103,16 +103,13 @@ def linear_systems(
 
 
 @dataclass(frozen=True, eq=False)
-class DiscreteProblem:
-    """One discrete problem."""
+class DiscreteProblem(AdmissibleSet):
+    """One discrete problem: L over K_h."""
 
     problem: Problem
     space: Space
-    found: list[ContactLine]  # one for each contact pair
-    lines: list[ContactLine]  # the same with the points that carry rows
+    found: list[ContactLine]  # one for each contact pair, with all points
     conditions: Conditions  # Gamma_u and Gamma_0 at nodes
-    rows: Rows  # the contact rows of all pairs in order
-    basis: BasisTransformation  # unknowns in which rows and prescribed values are single unknowns
     program: QuadraticProgram  # in those unknowns
     systems: BorderedSystems  # its linear systems, with the factorisation once there is one
     rigid: Rigid | None  # rigid motions that supports leave free, if there are any
@@ -124,10 +121,7 @@ class DiscreteProblem:
         Supports rest, the other points are free, and there are no loads: one back-solve where there
         is a factorisation for the active set.
 
-        Raises
-        ------
-        ConvergenceError
-            Active points and supports leave a rigid motion free.
+        Active points and supports that leave a rigid motion free are a `ConvergenceError`.
         """
         p, systems = self.program, self.systems
         if not p.null_space.resisted(p.unknown[active]):
@@ -311,13 +305,11 @@ def discretise(
         program = _program(b, admissible, rigid, K)
         systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
+        **by_field(admissible),
         problem=problem,
         space=space,
         found=found,
-        lines=admissible.lines,
         conditions=conditions,
-        rows=rows,
-        basis=basis,
         program=program,
         systems=systems,
         rigid=rigid,
@@ -371,12 +363,7 @@ def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
     """Exact minimiser of L over K_h, from the first active set `active` (m,): (P_1h), (P_2h).
 
     Bodies that contact alone can hold start from where they rest when rigid, so that the way
-    there costs no digits of the deformation.
-
-    Raises
-    ------
-    ConvergenceError
-        See `qp.minimise`; carries the last iterate.
+    there costs no digits of the deformation. What is raised is of `qp.minimise`.
     """
     p, rigid, systems = discrete.program, discrete.rigid, discrete.systems
     if rigid is None or not rigid.placing.any():

@@ -143,11 +143,7 @@ def free_motions(
 
     And their unknowns (d * N, r) in V_h. Of those that are rigid in the model: `motions` (m,), see
     `Model`.
-
-    Raises
-    ------
-    ValueError
-        The elements do not contain the rotation of a free body.
+    Elements that do not contain the rotation of a free body are refused.
     """
     trace = space.trace
     bodies, rigid = connected_bodies(trace), np.flatnonzero(motions)

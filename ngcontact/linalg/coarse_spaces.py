@@ -35,12 +35,8 @@ def coarsenings(
     Node values and edge functions are u = T y of the unknowns y, d of each node, with `T`
     (d * n, d * n): x of all nodes first, vertices before all others. `parents` (nv, 2) are the ends
     of the edges that refinement halved, -1 for vertices of the first mesh; `linear` (n, nv) the
-    functions of degree 1 in nodes and edge functions.
-
-    Raises
-    ------
-    ArithmeticError
-        Contact rows refer to each other in a ring: their unknowns have no local inverse.
+    functions of degree 1 in nodes and edge functions. Contact rows that refer to each other in a
+    ring, whose unknowns have no local inverse, are an `ArithmeticError`.
     """
     n, vertices = T.shape[0] // d, len(parents)
     steps = [(linear, np.arange(vertices))] if n > vertices else []

@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, chords
-from ..contact import ContactState, contact_line, faced_vertices, twins
+from ..contact import ContactState, by_line, contact_line, faced_vertices, twins
 from ..discrete import carried_active_set
 from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
@@ -218,11 +218,10 @@ def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) 
     view, trace = MeshArrays(mesh), boundary_trace(mesh, 2, model_of(problem))
     lines = [contact_line(trace, contact) for contact in problem.contact]
     pair, closed = np.full(len(view.facets), -1), np.zeros(len(view.facets), dtype=bool)
-    partner, start = np.full(mesh.nv, -1), 0
-    active = carried_active_set(lines, pairs)
-    for number, line in enumerate(lines):
-        own, middle = active[start : start + len(line.node)], line.rows[:, 1]
-        start += len(line.node)
+    partner = np.full(mesh.nv, -1)
+    active = by_line(lines, carried_active_set(lines, pairs))
+    for number, (line, own) in enumerate(zip(lines, active, strict=True)):
+        middle = line.rows[:, 1]
         new = (middle >= 0) & (pair[line.segments] < 0)  # to earlier pairs those of both
         met = line.segments[new]
         pair[met], closed[met] = number, own[middle[new]]

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..adaptivity import END_POWER, RefinementTree, corners
 from ..arrays import Array, Mask, by_field
+from ..contact import by_line
 from ..discrete import discretise, minimise_energy
 from ..errors import ContactError, ConvergenceError, warn
 from ..fem import (
@@ -261,12 +262,11 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
     curved = mesh.mesh(order)
     check_curves(curved)
     discrete = discretise(problem, curved, order, ELEMENT)
-    p, start = discrete.program, 0
+    p, lines = discrete.program, discrete.lines
     zone = np.zeros(len(p.g), dtype=bool)
-    for line in discrete.lines:
-        points = line.rows[mesh.closed[line.segments]].ravel()
-        zone[start + points[points >= 0]] = True
-        start += len(line.node)
+    for line, closed in zip(lines, by_line(lines, zone), strict=True):
+        points = line.rows[mesh.closed[line.segments]]
+        closed[points[points >= 0]] = True
     known = replace(p, equality=zone, g=np.where(zone, p.g, np.inf))
     minimiser = minimise_energy(replace(discrete, program=known), zone)
     if not np.array_equal(minimiser.active, zone):

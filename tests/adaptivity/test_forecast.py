@@ -8,17 +8,10 @@ from netgen.occ import Axis, OCCGeometry, Rectangle, Z
 
 from drivers.reference import cases
 from ngcontact import Elastic, Problem, adapt
-from ngcontact.adaptivity import (
-    Aim,
-    Forecast,
-    RefinementTree,
-    Refining,
-    Singularities,
-    corners,
-    ends_of_contact,
-    planned,
-)
 from ngcontact.adaptivity.continuation import rebuilt, transferred
+from ngcontact.adaptivity.planning import Aim, Forecast, planned
+from ngcontact.adaptivity.refinement import RefinementTree, Refining
+from ngcontact.adaptivity.singularities import Singularities, corners, ends_of_contact
 from ngcontact.fem import boundary_trace, unknowns
 from ngcontact.geometries import blocks, rings
 from ngcontact.mesh import first_mesh
