@@ -1,8 +1,8 @@
-from .continuation import continued as continued
 from .marking import doerfler as doerfler
 from .planning import Plan as Plan
 from .planning import Refinement as Refinement
 from .planning import check_bool as check_bool
+from .planning import continued as continued
 from .planning import next_plan as next_plan
 from .refinement import RefinementTree as RefinementTree
 from .refinement import refined as refined

@@ -1,7 +1,11 @@
-"""How a run is refined, and the next level, planned on what the last one estimates."""
+"""How a run is refined: levels are planned on what the last one, or one of another load, estimates.
+
+The first level for a load beside one that was solved is made from the first mesh.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from numbers import Real
 
@@ -12,7 +16,7 @@ from ..arrays import Array, Index, Mask, across, joined, root_of_squares
 from ..estimator import Estimated
 from ..fem import ORDERS, check_element, unknowns
 from ..mesh import copied, curve, unresolved
-from ..problem import MeshArrays, bisect
+from ..problem import MeshArrays, Problem, bisect
 from .marking import doerfler
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact
@@ -25,6 +29,8 @@ WRONG_FORECAST = 2.0
 # Order that is chosen at least: a first level of order 2 costs as much, and sees less.
 LEAST_ORDER = 3
 FIRST_GROWTH = 2.0  # of the unknowns up to which the next level is planned at first
+# Of the unknowns that the tolerance requires: on the first level of another load.
+FIRST_LEVEL_SHARE = 0.5
 
 
 def best_order(error: float) -> int:
@@ -126,10 +132,7 @@ def next_plan(
         mesh, _ = curve(mesh, last.order, refinement.element)
         return replace(last, mesh=mesh, tree=RefinementTree(mesh, np.arange(mesh.ne)))
     problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
-    small = below_resolution(mesh, last.corners.unresolvable)
-    indicators = np.where(small, 0.0, solution.indicators)
-    if not indicators.any():
-        indicators = solution.indicators
+    indicators = _of_resolvable(solution, last.corners)
     order = refinement.next_order(last.order, solution.relative_error_estimate)
     size, pairs = refinement.ending * solution.relative_error_estimate, solution.expected
     limit, marked = at_limit(mesh, mesh.GetCurveOrder()), doerfler(indicators, theta)
@@ -147,17 +150,19 @@ def next_plan(
     now = unknowns(mesh, order, refinement.element)
     relative = min(solution.relative_error_estimate, 1.0)
     scale = relative ** (order / last.order - 1)  # errors of orders p on one mesh are c^p
-    forecast = Forecast(
-        corners=MeshArrays(mesh).corners,
-        squares=(scale * indicators / error) ** 2,
-        order=order,
-        singular=joined([last.corners, ends_of_contact(pairs)]),
-    )
+    forecast = Forecast.of(solution, last.corners, (scale * indicators / error) ** 2, order)
     aim = Aim(now * growth, refinement.max_dofs, share, theta, size)
     refining, share = planned(Refining(problem, mesh), marked, forecast, aim, refinement.element)
     mesh, _ = curve(refining.finished(), order, refinement.element)
     tree = replace(last.tree, element=last.tree.element[refining.origin])
     return Plan(mesh, order, last.corners, share * error, growth, tree, stuck, unresolved(mesh))
+
+
+def _of_resolvable(solution: Estimated, corners: Singularities) -> Array:
+    """Indicators (ne,), 0 at `corners` where no mesh makes them less, unless all would be."""
+    small = below_resolution(solution.mesh, corners.unresolvable)
+    rest = np.where(small, 0.0, solution.indicators)
+    return rest if rest.any() else solution.indicators
 
 
 @dataclass(frozen=True)
@@ -235,6 +240,14 @@ class Forecast:
     order: int  # p, of the displacement
     singular: Singularities  # where the solution is not smooth
 
+    @classmethod
+    def of(
+        cls, solution: Estimated, corners: Singularities, squares: Array, order: int
+    ) -> Forecast:
+        """The `squares` (ne,) of the mesh of a solution, singular at `corners` and its ends."""
+        singular = joined([corners, ends_of_contact(solution.expected)])
+        return cls(MeshArrays(solution.mesh).corners, squares, order, singular)
+
     @property
     def error(self) -> float:
         """The error, over the one that was estimated."""
@@ -262,3 +275,107 @@ class Forecast:
         limits = share * self.singular.extents[ends]
         marked[large] |= (at & (sizes[large, None] > limits)).any(axis=1)
         return marked
+
+
+def continued(
+    problem: Problem, start: Estimated, first: Plan, refinement: Refinement, goal: float | None
+) -> Plan:
+    """The first level of a `problem` that is near the one of `start`.
+
+    It has half the unknowns that the `goal`, a relative estimate, requires, or that of `start`: it
+    shows where contact ends now, and the level after it can be the last one. `first` is the plan of
+    the first mesh, with the tree of the elements of `start`.
+    """
+    rest = _of_resolvable(start, first.corners)
+    order, element, error = refinement.order, refinement.element, root_of_squares(rest)
+    known = Forecast.of(start, first.corners, (rest / error) ** 2, order)
+    now = start.relative_error_estimate * error / root_of_squares(start.indicators)
+    share = (goal or now) / now * FIRST_LEVEL_SHARE ** (-order / 2)  # unknowns ~ error^(-2/p)
+    most = refinement.growth**2 * unknowns(start.mesh, order, element)
+    aim = Aim(most, refinement.max_dofs, share, refinement.theta, refinement.ending, np.inf)
+    refining = rebuilt(problem, first.tree, known, aim, element)
+    finer = refining.mesh.ne > refining.given.ne
+    mesh, _ = curve(refining.finished() if finer else refining.given, order, element)
+    tree = RefinementTree(refining.given, refining.origin)
+    if unknowns(mesh, order, element) > refinement.max_dofs:
+        mesh, tree = first.mesh, RefinementTree(first.mesh, np.arange(first.mesh.ne))
+    return replace(first, mesh=mesh, tree=tree)
+
+
+def rebuilt(
+    problem: Problem, tree: RefinementTree, known: Forecast, aim: Aim, element: str
+) -> Refining:
+    """The mesh, refined from the first one, of which `known` squares forecast the aim's error."""
+    refining, corners = Refining(problem, tree.mesh), MeshArrays(tree.mesh).corners
+    squares = transferred(known, tree.element, corners)
+    guess = TransferredForecast(
+        corners, squares, known.order, known.singular, known, tree.element, aim.error
+    )
+    limit = at_limit(tree.mesh, tree.mesh.GetCurveOrder())
+    marked = guess.marked(aim.theta, aim.ending) & ~limit
+    if guess.error > aim.error and marked.any():
+        refining, _ = planned(refining, marked, guess, aim, element)
+    return refining
+
+
+@dataclass(frozen=True, eq=False)
+class TransferredForecast(Forecast):
+    """Squared indicators on coarser elements, or others, from those of a mesh that was solved on.
+
+    The indicators of known elements in one element make a mean of |D^(p+1) u|^2, or at a singular
+    point its coefficient; both give the element's indicator by the powers of `Forecast`.
+    """
+
+    known: Forecast  # of the mesh that was solved on, n elements
+    inside: Index  # (n,), the element in which the centre of each of these lies
+    aim: float  # the error to reach, over the known one
+
+    def after(self, corners: Array, parent: Index) -> TransferredForecast:
+        """Forecast on elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
+        inherited = super().after(corners, parent).squares
+        inside = _inside(self.known.corners.mean(axis=1), self.inside, corners, parent)
+        squares = transferred(self.known, inside, corners)
+        squares = np.where(np.isnan(squares), inherited, squares)
+        return replace(self, corners=corners, squares=squares, inside=inside)
+
+    def marked(self, theta: float, share: float) -> Mask:
+        """Elements (ne,) to refine: so many that the others have the error `aim`; ends move."""
+        rest = (self.aim / self.error) ** 2 if self.error > 0 else 1.0
+        return doerfler(np.sqrt(self.squares), 1.0 - min(rest, 1.0))
+
+
+def _inside(places: Array, inside: Index, corners: Array, parent: Index) -> Index:
+    """The parts (n,) of elements `inside` (n,) in which, or nearest to which, places (n, 2) lie."""
+    order, count = np.argsort(parent, kind="stable"), np.bincount(parent)
+    first = np.cumsum(count) - count
+    found, deepest = order[first[inside]], np.full(len(inside), -math.inf)
+    for number in range(count.max()):
+        several = np.flatnonzero((count[inside] > 1) & (number < count[inside]))
+        part = order[first[inside[several]] + number]
+        depth = depths(corners[part], places[several])
+        better = depth > deepest[several]
+        found[several[better]], deepest[several[better]] = part[better], depth[better]
+    return found
+
+
+def transferred(known: Forecast, inside: Index, corners: Array) -> Array:
+    """Squared indicators (k,) of elements with `corners` (k, 3, 2); NaN where nothing is known.
+
+    `known` are those of n other elements, `inside` (n,) the elements in which they lie.
+    """
+    whole = areas(known.corners).sum()
+    area, old = areas(corners) / whole, areas(known.corners) / whole
+
+    def sums(values: Array) -> Array:
+        return np.bincount(inside, values, len(area)).astype(float)
+
+    power = known.order + 1.0
+    with np.errstate(invalid="ignore"):
+        smooth = sums(known.squares * old**-known.order) / sums(old) * area**power
+    at, was_at = (touching(c, known.singular.places) for c in (corners, known.corners))
+    for number, power in enumerate(known.singular.powers):
+        touched = np.where(was_at[:, number], old**-power * known.squares, 0.0)
+        coefficient, seen = sums(touched), sums(was_at[:, number].astype(float)) > 0
+        with_it = at[:, number] & seen
+        smooth[with_it] = np.minimum(smooth[with_it], (coefficient * area**power)[with_it])
+    return smooth

@@ -1,6 +1,6 @@
 from .coarse_spaces import COARSEST as COARSEST
 from .coarse_spaces import coarsenings as coarsenings
-from .iterative import IterativeSystems as IterativeSystems
+from .multigrid import IterativeSystems as IterativeSystems
 from .multigrid import Multigrid as Multigrid
 from .multigrid import truncated_multigrid as truncated_multigrid
 from .sparse import cholesky as cholesky

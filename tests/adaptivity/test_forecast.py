@@ -8,8 +8,7 @@ from netgen.occ import Axis, OCCGeometry, Rectangle, Z
 
 from drivers.reference import cases
 from ngcontact import Elastic, Problem, adapt
-from ngcontact.adaptivity.continuation import rebuilt, transferred
-from ngcontact.adaptivity.planning import Aim, Forecast, planned
+from ngcontact.adaptivity.planning import Aim, Forecast, planned, rebuilt, transferred
 from ngcontact.adaptivity.refinement import RefinementTree, Refining
 from ngcontact.adaptivity.singularities import Singularities, corners, ends_of_contact
 from ngcontact.fem import boundary_trace, unknowns

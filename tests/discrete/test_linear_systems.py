@@ -10,7 +10,7 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from ngcontact.discrete.discrete_problem import MULTIGRID, minimise_energy
-from ngcontact.linalg import iterative
+from ngcontact.linalg import multigrid
 from tests.scenes import REFINED
 
 ORDERS = (1, 2, 3, 4)
@@ -89,7 +89,7 @@ def test_adaptive_meshes(large, name: str, order: int):
 )
 def test_systems_that_stall_are_factorised(large, caplog, monkeypatch, limit: str, value: int):
     """In a Newton step, after many of them, and in the last refinement."""
-    monkeypatch.setattr(iterative, limit, value)
+    monkeypatch.setattr(multigrid, limit, value)
     problem = REFINED["disc"]
     mesh = uniform_mesh(problem, 1, 3000)
     with caplog.at_level("INFO", logger="ngcontact"):

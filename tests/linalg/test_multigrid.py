@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.linalg.iterative import IterativeSystems
-from ngcontact.linalg.multigrid import LONG_ROWS, GaussSeidel, StalledError, truncated_multigrid
+from ngcontact.linalg.multigrid import (
+    LONG_ROWS,
+    GaussSeidel,
+    IterativeSystems,
+    StalledError,
+    truncated_multigrid,
+)
 from ngcontact.linalg.sparse import cholesky, congruent, handed_over
 from ngcontact.qp import BorderedSystems
 from tests.scenes import REFINED, discrete, steps_of
