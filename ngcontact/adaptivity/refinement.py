@@ -83,14 +83,13 @@ def _move_to_partners(trace: BoundaryTrace, contact: Contact, pairs: Index) -> N
 
 
 def _without_inversion(mesh: ng.Mesh, old: Array, new: Array) -> Array:
-    """The new positions, but the old ones at triangles they would turn over."""
+    """The `new` positions (nv, 2), in place the `old` ones (nv, 2) at triangles they turn over."""
     triangles = MeshArrays(mesh).elements
     while True:
         a, b, c = np.moveaxis(new[triangles], 1, 0)
         turned = np.unique(triangles[(across(b - a) * (c - a)).sum(axis=1) <= 0])
         if not (new[turned] != old[turned]).any():
             return new
-        new = new.copy()
         new[turned] = old[turned]
 
 

@@ -298,14 +298,11 @@ def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
     reach = np.abs(solution.displacement.vec.FV().NumPy()).max()
     for number, state in enumerate(solution.pairs):
         line = state.line
-        known = np.asarray((line.rows >= 0).all(axis=1))
-        points = np.where(known[:, None], line.rows, 0)
-        closed = known & state.active[points].all(axis=1)
-        opened = np.flatnonzero(known & ~closed)
-        gap = state.gap[points[opened]] @ lagrange(order, s).T
+        closed = line.on_segments(state.active, False).all(axis=1)
+        opened = (line.rows >= 0).all(axis=1) & ~closed
+        gap = line.on_segments(state.gap, 0.0)[opened] @ lagrange(order, s).T
         if gap.min(initial=0.0) < -GAP_ERROR * reach:
-            at = np.unravel_index(gap.argmin(), gap.shape)
-            x = trace.point(line.segments[opened[at[0]]][None], s[at[1]][None])[0]
+            x = trace.point(*trace.at_places(line.segments[opened], s))[gap.argmin()]
             return f"pair {number} penetrates by {-gap.min():.2g} at ({x[0]:.6g}, {x[1]:.6g})"
         inside = line.segments[closed]
         inside = inside[~np.isin(trace.nodes[inside], tips).any(axis=1)]
