@@ -14,7 +14,7 @@ from .bound import DualProblem, Proof, largest
 from .cells import Cells
 from .facing import POINTS, FacingSides, bernstein, fitted, jump, opposite_points
 from .lifting import lifted
-from .program import Balanced
+from .program import LIMIT_SLACK, Balanced
 
 JUMP_NOISE = 1e-13  # of a jump, relative to the largest displacement
 LIFTING_DEGREE = 3  # degree of w on these: higher ones take 2 % off the bar and twice the time
@@ -58,11 +58,11 @@ def force_bar(
     given = replace(dual.given, loads=np.zeros_like(dual.given.loads))
     moments = np.zeros_like(dual.moments)
     test = replace(dual, given=given, elements=elements, moments=moments)
-    first, ratio = _within(test, stress.pressure, np.inf)
-    size = float(np.linalg.norm(first.s.norms()[0]))
+    nearest, ratio = _within(test, stress.pressure, np.inf)
+    size = float(np.linalg.norm(nearest.s.norms()[0]))
     limit = max(kappa, KAPPA_GROWTH * size / B if B > 0 else 0.0)
-    limit = limit if ratio > limit else np.inf
-    nearest, ratio = _within(test, stress.pressure, limit, first)
+    if ratio > LIMIT_SLACK * limit:
+        nearest, ratio = _within(test, stress.pressure, limit, nearest)
     t = test.admissible(nearest)
     size = float(np.linalg.norm(t.distance + t.loads))
     kappa = max(kappa, ratio, size / B if B > 0 else 0.0)  # up to M / B it costs nothing

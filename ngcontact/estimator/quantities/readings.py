@@ -72,8 +72,8 @@ class Measured(Guaranteed):
             return None, f"nothing is guaranteed: {error}"
 
     @cached_property
-    def _force_errors(self) -> dict[int, tuple[Array, str]]:
-        """Proved errors of the force by pair, (2,), infinite where nothing is proved, and why."""
+    def _force_errors(self) -> dict[int, tuple[float, str]]:
+        """Proved errors of the force by pair, infinite where nothing is proved, and why."""
         return {}
 
     def contact_area(self, pair: int = 0) -> float:
@@ -198,9 +198,7 @@ def _of_pair(
     each = zip(parts.items(), errors.tolist(), strict=True)
     forces = [Quantity(name, float(value), bar, "estimated") for (name, value), bar in each]
     if proof is not None:
-        proved, reason = _proved_force_errors(solution, pair, e)
-        if np.isfinite(proved).all():
-            forces = [x.with_proof(bar) for x, bar in zip(forces, proved.tolist(), strict=True)]
+        forces, reason = _with_proof(solution, forces, pair, e)
     if of_shape > VALUE_ROUND_OFF * largest:
         forces = [replace(x, error=x.error + of_shape, kind="estimated") for x in forces]
     rows = [
@@ -250,46 +248,36 @@ def _energy(solution: Measured, proved: bool) -> Quantity:
     return Quantity("energy", value, float(max(high - value, value - low)), "guaranteed")
 
 
-def _proved_force_errors(solution: Measured, pair: int, e: Array) -> tuple[Array, str]:
-    """Proved errors (3,) of a pair's force along `e` (2,) and of its components, or why none.
+def _with_proof(
+    solution: Measured, forces: list[Quantity], pair: int, e: Array
+) -> tuple[list[Quantity], str]:
+    """A pair's force along `e` (2,) and its components with proved errors, or why none is proved.
 
-    Infinite where nothing is proved, or more than the force itself.
+    Where directions of contact turn only what lies along e has one.
     """
-    known = solution._force_errors
+    d, known = solution.pairs[pair].line.direction, solution._force_errors
+    straight = len(d) > 0 and np.ptp(d, axis=0).max() <= STRAIGHT
+    along = d[0] if straight else e  # the force is one number times d
     if pair not in known:
         try:
-            known[pair] = _force_errors(solution, pair, e), ""
-        except (ContactError, ValueError) as error:
-            known[pair] = np.full(2, np.inf), f"no error of the force is proved: {error}"
-    (along, across), reason = known[pair]
-    if np.isinf(along):
-        return np.full(3, np.inf), reason
-    return np.append(along, np.abs(e) * along + np.abs(e[::-1]) * across), reason
+            known[pair] = _force_error(solution, pair, along), ""
+        except (ContactError, ValueError) as none:
+            known[pair] = np.inf, f"no error of the force is proved: {none}"
+    error, reason = known[pair]
+    for k, share in enumerate(np.abs(np.vstack([e, np.eye(2)]) @ along).tolist()):
+        if error < np.inf and (straight or share >= 1 - STRAIGHT):
+            forces[k] = forces[k].with_proof(error * share if share > STRAIGHT else 0.0)
+    return forces, reason
 
 
-def _force_errors(solution: Guaranteed, pair: int, e: Array) -> Array:
-    """Bounds of the error of a pair's contact force along `e` (2,) and across it."""
+def _force_error(solution: Guaranteed, pair: int, e: Array) -> float:
+    """Bound of the error of the component of a pair's contact force along `e` (2,)."""
     if not solution.problem.model.startswith("plane"):
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
     if len(solution.pairs[pair].line.node) == 0:
         raise ValueError("the points of this pair belong to other pairs, which have its force")
     if has_rough_loads(solution.problem, solution.mesh, solution.order):
         raise ValueError("loads that are rougher than the mesh count as they are integrated")
-    d, across = solution.pairs[pair].line.direction, np.array([-e[1], e[0]])
-    if np.ptp(d, axis=0).max() <= STRAIGHT:  # the force is one number times d
-        one = _component_error(solution, pair, d[0])
-        along, other = (one * abs(float(d[0] @ x)) for x in (e, across))
-        other = other if other > STRAIGHT * along else 0.0
-    else:
-        along, other = (_component_error(solution, pair, x) for x in (e, across))
-    size = float(np.linalg.norm(solution.contact_force(pair)))
-    if max(along, other) > size > 0:
-        raise ValueError(f"what is proved, {max(along, other):.2g}, is more than the force itself")
-    return np.array([along, other])
-
-
-def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
-    """Bound of the error of the force's component along `e` (2,), by a dual problem."""
     states, space, u = solution.pairs, solution.discrete.space, solution.displacement
     directions = [e if number == pair else 0 * e for number in range(len(states))]
     jumps = [s.line.direction @ d for s, d in zip(states, directions, strict=True)]
@@ -315,7 +303,11 @@ def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
             dx = ng.dx(bonus_intorder=order - DX_ORDER, definedonelements=ng.BitArray(some))
             missed += float(ng.Integrate(work * dx, mesh))
         missed -= float(a @ (space.A @ b)) - (0.0 if space.initial is None else space.initial @ b)
-    return error + noise + abs(missed)
+    error += noise + abs(missed)
+    size = float(np.linalg.norm(solution.contact_force(pair)))
+    if error > size > 0:
+        raise ValueError(f"what is proved, {error:.2g}, is more than the force itself")
+    return error
 
 
 def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
