@@ -251,7 +251,7 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    known: Sequence[tuple[Cells, Multipliers, Sequence[Element]]] = (),
+    known: tuple[Cells, Multipliers, Sequence[Element]] | None = None,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
@@ -263,14 +263,14 @@ def elements_of(
     varying = data.varies[cells.bodies]
     kind = [mu.of_stress, highest, cells.on_axis, cells.curved, varying]
     strain, found, rest = elastic_strain(problem, displacement), [], np.ones(len(highest), bool)
-    for other, multipliers_, elements in known:
-        both = (_identity(other, multipliers_), _identity(cells, mu))
+    if known is not None:
+        both = (_identity(*known[:2]), _identity(cells, mu))
         _, first, same = np.unique(
             np.concatenate(both), axis=0, return_index=True, return_inverse=True
         )
         before = first[same.ravel()[len(both[0]) :]]
         rest &= before >= len(both[0])
-        for e in elements:
+        for e in known[2]:
             at, rows = e.among(before)
             if at.size:
                 found.append(e.part(rows, cells, at, mu))

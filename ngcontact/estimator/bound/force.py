@@ -10,11 +10,11 @@ import numpy as np
 
 from ...arrays import Array
 from ...fem import model_of
-from .bound import DualProblem, Proof, largest
+from .bound import Proof, largest
 from .cells import Cells
 from .facing import POINTS, FacingSides, bernstein, fitted, jump, opposite_points
 from .lifting import lifted
-from .program import LIMIT_SLACK, Balanced
+from .program import LIMIT_SLACK, AdmissibleStress, DualProblem
 
 JUMP_NOISE = 1e-13  # of a jump, relative to the largest displacement
 LIFTING_DEGREE = 3  # degree of w on these: higher ones take 2 % off the bar and twice the time
@@ -43,7 +43,7 @@ def force_bar(
         No bar is proved.
     """
     dual, stress, B = proof.dual, proof.stress, proof.bound
-    cells, lines, kappa = dual.cells, dual.program.lines, 0.0
+    cells, lines, kappa = dual.cells, dual.lines, 0.0
     excess = []
     for f, e in zip(lines, [*directions, np.zeros(2)], strict=False):  # 0 on guides, the last
         excess.append(_excess(cells, G, f, e))
@@ -53,19 +53,12 @@ def force_bar(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
         )
     problem = proof.problem
-    strain = model_of(problem).strain(G)
-    elements = [e.of_strain(e.places.evaluate(strain)) for e in dual.elements]
-    given = replace(dual.given, loads=np.zeros_like(dual.given.loads))
-    moments = np.zeros_like(dual.moments)
-    test = replace(dual, given=given, elements=elements, moments=moments)
-    nearest, ratio = _within(test, stress.pressure, np.inf)
-    size = float(np.linalg.norm(nearest.s.norms()[0]))
-    limit = max(kappa, KAPPA_GROWTH * size / B if B > 0 else 0.0)
-    if ratio > LIMIT_SLACK * limit:
-        nearest, ratio = _within(test, stress.pressure, limit, nearest)
-    t = test.admissible(nearest)
-    size = float(np.linalg.norm(t.distance + t.loads))
-    kappa = max(kappa, ratio, size / B if B > 0 else 0.0)  # up to M / B it costs nothing
+    test = dual.of_strain(model_of(problem).strain(G))
+    t, ratio = _within(test, stress.force, np.inf)
+    least = max(kappa, KAPPA_GROWTH * t.size / B if B > 0 else 0.0)
+    if ratio > LIMIT_SLACK * least:
+        t, ratio = _within(test, stress.force, least, t)
+    kappa = max(kappa, ratio, t.size / B if B > 0 else 0.0)  # up to M / B it costs nothing
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     r = []
     for f, (x, y) in zip(lines, excess, strict=True):
@@ -80,27 +73,22 @@ def force_bar(
     pressed = zip(lines, stress.pressure, r, strict=True)
     opened = sum(float((f.force(p) * opening).sum()) for f, p, opening in pressed)
     crossed = float((stress.distance + stress.loads) @ w)
-    on_motions = stress.free_force and stress.free_force * largest(elements, G)
+    on_motions = stress.free_force and stress.free_force * largest(test.elements, G)
     return error + abs(t.work) + crossed + abs(opened) + on_motions
 
 
 def _within(
-    test: DualProblem, pressure: Sequence[Array], kappa: float, start: Balanced | None = None
-) -> tuple[Balanced, float]:
+    test: DualProblem, force: Array, kappa: float, start: AdmissibleStress | None = None
+) -> tuple[AdmissibleStress, float]:
     """The stress near to that of G with |q*| <= kappa p*, and the largest |q*| / p*.
 
-    `pressure` (k, n) each is p*. Any q* where forces have any sign.
+    `force` (m,) are those of p*. Any q* where they have any sign.
     """
-    lines = test.program.lines
-    limits = [
-        np.full_like(p, np.inf) if f.equality else np.where(p > 0, kappa, 0) * p
-        for f, p in zip(lines, pressure, strict=True)
-    ]
-    found, ratio = test.program.nearest(test.elements, test.moments, limits, start), 0.0
-    for f, q, p in zip(lines, found.pressure, pressure, strict=True):
-        if not f.equality:
-            ratio = max(ratio, float((np.abs(q[p > 0]) / p[p > 0]).max(initial=0.0)))
-    return found, ratio
+    pressed = ~test.program.equality & (force > 0)
+    limits = np.where(test.program.equality, np.inf, 0.0)
+    limits[pressed] = kappa * force[pressed]
+    found = test.nearest(limits=limits, start=start)
+    return found, float(np.abs(found.force[pressed] / force[pressed]).max(initial=0.0))
 
 
 def _excess(cells: Cells, G: ng.GridFunction, f: FacingSides, e: Array) -> tuple[Array, Array]:

@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index
 from ...errors import ContactError
 from ...linalg import cholesky, lower_half, summed
 from ...qp import (
@@ -29,8 +30,12 @@ from ...qp import (
     pinned_null_space,
     vanishing_combinations,
 )
-from .elements import Element, Multipliers, Stress, traces
+from .cells import Cells
+from .elements import Element, Multipliers, Stress, by_triangle, rigid_motions, traces
 from .facing import POINTS, FacingSides
+from .lifting import Prescribed
+from .oscillation import EQUILIBRIUM_RESIDUAL, oscillation_norms, residuals
+from .tractions import BoundaryData
 
 FALLING_RATIO = 0.5  # ratio of two residuals from which more corrections take nothing off
 MOMENT_ROUND_OFF = 1e-14  # of tractions, relative to the largest: nothing to correct
@@ -48,20 +53,33 @@ DIAGONAL_SHIFT = 1e-14  # of the diagonal, for vertices where tractions depend o
 
 
 @dataclass(frozen=True, eq=False)
-class Balanced:
-    """A stress in equilibrium, with the pressures on the lines."""
+class AdmissibleStress:
+    """An admissible stress s on n triangles, compared with C e of a displacement u_h."""
 
     s: Stress  # in equilibrium
+    force: Array  # (m,) of all rows
     pressure: list[Array]  # (k, j) each, Bernstein coefficients of p*, per length (P1), eta (P2)
-    unbalanced: Array  # (d,) moments of tractions that do not balance
+    distance: Array  # (n,) |s - C e|, root of an energy per thickness
+    loads: Array  # (n,) norms of what s misses of the data, the same
+    work: float  # <s n, u_D - u_h> - int p* gap_h, an energy per thickness
+    residual: float  # of equilibrium, relative to the largest stress
     free_force: float  # sum of moments that hold free motions, a force per thickness
+
+    @property
+    def size(self) -> float:
+        """|s - C e| with what is missed, root of an energy per thickness."""
+        return float(np.linalg.norm(self.distance + self.loads))
 
 
 @dataclass(frozen=True, eq=False)
-class DualProgram:
-    """The matrix of d multipliers, factorised once for all loads."""
+class DualProblem:
+    """The dual contact problem on n cells with d multipliers, for the strain of a displacement."""
 
+    cells: Cells
+    given: BoundaryData
+    prescribed: Sequence[Prescribed]  # u_D - u_h
     multipliers: Multipliers
+    elements: Sequence[Element]
     lines: Sequence[FacingSides]  # contact and guides
     R: sp.csr_array  # (m, d) all rows over their `FacingSides.mass`
     T: sp.csr_array  # (d, d) mu = T y: each row is an unknown of y
@@ -76,24 +94,35 @@ class DualProgram:
         """All but the factor, which is made again."""
         return {name: value for name, value in vars(self).items() if name != "systems"}
 
+    def of_strain(self, strain: ng.CoefficientFunction) -> DualProblem:
+        """The same for a displacement of another `strain` without loads, with the same factor."""
+        found = replace(
+            self,
+            given=replace(self.given, loads=np.zeros_like(self.given.loads)),
+            elements=[e.of_strain(e.places.evaluate(strain)) for e in self.elements],
+        )
+        vars(found)["systems"] = self.systems
+        return found
+
     def nearest(
         self,
-        elements: Sequence[Element],
-        moments: Array,
-        limits: Sequence[Array] | None = None,
-        start: Balanced | None = None,
-    ) -> Balanced:
-        """The stress that minimises B^2 for given tractions, `moments` (d,), with p* >= 0.
+        least: float = 0.0,
+        limits: Array | None = None,
+        start: AdmissibleStress | None = None,
+    ) -> AdmissibleStress:
+        """The admissible stress that minimises B^2, with p* >= 0.
 
-        With `limits` (k, j) of each line, not negative: one near to the strain without a gap, whose
-        |p*| are at most `LIMIT_SLACK` times these; it may be made from another one, `start`.
+        With `limits` (m,), not negative: one near to the strain without a gap, of which forces on
+        rows are at most `LIMIT_SLACK` times these; it may be made from another one, `start`.
+        Residuals are relative to the largest stress, which counts as `least` at the least.
 
         Raises
         ------
         ContactError
-            Loads on a body that moves freely are not in balance.
+            Loads on a body that moves freely are not in balance, or no equilibrium is found.
         """
-        p, s = self.program, Stress(elements, [e.g for e in elements])
+        p, moments = self.program, self.given.moments(self.multipliers)
+        s = Stress(self.elements, [e.g for e in self.elements])
         alone, largest = s.traction_moments()
         idle = self._on_free_motions(moments - alone)
         holding = float(np.abs(idle).max())
@@ -108,8 +137,7 @@ class DualProgram:
             low, high = np.where(p.equality, -np.inf, 0.0), np.full(len(p.g), np.inf)
             active = _joined([x.pressed for x in self.lines], bool)
         else:
-            high = _joined([x.mass * limit for x, limit in zip(self.lines, limits, strict=True)])
-            low, active = -high, high > 0
+            low, high, active = -limits, limits, limits > 0
         if start is not None:
             s = start.s
         elif limits is None and len(active):
@@ -121,8 +149,8 @@ class DualProgram:
             # Stresses of stiff bodies are small differences of multipliers: tractions show what is
             # left. Rows beyond their limits, as those that pull by round-off, stay at these.
             change = self.T @ y
-            parts = zip(elements, s.coefficients, strict=True)
-            s = Stress(elements, [c + e.answer(change) for e, c in parts])
+            parts = zip(self.elements, s.coefficients, strict=True)
+            s = Stress(self.elements, [c + e.answer(change) for e, c in parts])
             total, largest = s.traction_moments()
             left = moments - total
             left -= self._on_free_motions(left)
@@ -138,11 +166,35 @@ class DualProgram:
             last = size
             self.systems.restart(replace(p, b=right, g=np.zeros_like(p.g)))
             y = self.systems.approach(active)
+        return self._admissible(s, force, left, least, float(np.abs(idle).sum()))
+
+    def _admissible(
+        self, s: Stress, force: Array, left: Array, least: float, free_force: float
+    ) -> AdmissibleStress:
+        """A stress with a `force` (m,) on the rows, which leaves moments `left` (d,) unbalanced."""
+        cells, given = self.cells, self.given
+        distance, largest = s.norms()
+        scale = max(largest, least)
+        residual = float(residuals(cells, self.multipliers, left, scale).max())
+        if not residual <= EQUILIBRIUM_RESIDUAL:
+            raise ContactError(
+                f"no equilibrated stress was found: the residual relative to the largest stress is "
+                f"{residual:.1e}"
+            )
         mass = [x.mass for x in self.lines]
-        ends = np.cumsum([m.size for m in mass])[:-1]
-        each = zip(np.split(force, ends), mass, strict=bool(mass))
-        pressure = [f.reshape(m.shape) / m for f, m in each]
-        return Balanced(s, pressure, left, float(np.abs(idle).sum()))
+        parts = np.split(force, np.cumsum([m.size for m in mass])[:-1]) if mass else []
+        pressure = [part.reshape(m.shape) / m for part, m in zip(parts, mass, strict=True)]
+        have = s.tractions(cells.owner[given.side], given.x, given.normal)
+        missed = given.missed(have, self.lines, pressure, scale)
+        forces, moduli = (
+            by_triangle(self.elements, [getattr(e, name) for e in self.elements])
+            for name in ("missed", "modulus")
+        )
+        loads = oscillation_norms(cells, forces, moduli, missed)
+        work = sum(given.work(have, x.side, x.direction, x.amount) for x in self.prescribed)
+        for line, p in zip(self.lines, pressure, strict=True):
+            work -= float((line.force(p) * line.gap).sum())
+        return AdmissibleStress(s, force, pressure, distance, loads, work, residual, free_force)
 
     def _on_free_motions(self, load: Array) -> Array:
         """The part (d,) of a `load` (d,) that does work on free motions.
@@ -160,28 +212,33 @@ class DualProgram:
         return np.asarray(holding @ np.linalg.solve(lineal.T @ holding, lineal.T @ load))
 
 
-def dual_program(
+def dual_problem(
+    cells: Cells,
+    given: BoundaryData,
+    prescribed: Sequence[Prescribed],
     mu: Multipliers,
     elements: Sequence[Element],
-    fixed: Mask,
-    motions: Array,
     lines: Sequence[FacingSides],
-) -> DualProgram:
-    """The program of the condensed triangles, with `lines` of contact and guides.
-
-    Multipliers are `fixed` (d,) where no traction is given; `motions` (d, r) are those of rigid
-    motions that supports leave free.
-    """
-    d = int(mu.start[-1])
+) -> DualProblem:
+    """The problem of the condensed triangles, with `lines` of contact and guides."""
+    d, fixed = int(mu.start[-1]), given.fixed(mu)
     firsts = [mu.start[line.side, None] + np.arange(line.psi.shape[1]) for line in lines]
     unknown, null_space = _joined(firsts, np.intp), no_null_space(d)
     R, T = _basis(mu, lines, unknown)
+    # Where rows concern a triangle its part is one of y: their rows of T are not those of 1.
     other = abs(T - sp.eye_array(d)).sum(axis=1) > 0
-    parts = (part for e in elements for part in _of_unknowns(e, T, other))
-    K = summed([(at, at, N.transpose(0, 2, 1) @ N) for at, N in parts], (d, d))
+    blocks, concerned = list[tuple[Index, Index, Array]](), list[tuple[Index, Index, Array]]()
+    for e in elements:
+        some = other[e.dofs].any(axis=1)
+        for parts, own in ((blocks, ~some), (concerned, some)):
+            N, at = e.N[own], e.dofs[own]
+            parts.append((at, at, N.transpose(0, 2, 1) @ N))
+    part = (T.T @ summed(concerned, (d, d)) @ T).tocoo()
+    K = summed([*blocks, (part.row[:, None], part.col[:, None], part.data[:, None, None])], (d, d))
     size = K.diagonal()
     K.setdiag((1 + DIAGONAL_SHIFT) * size)
     idle = fixed | (size <= AXIS_STIFFNESS * size.max())  # on the axis there is no traction
+    motions = rigid_motions(cells, mu, fixed)
     if motions.shape[1]:
         y = splu(T.tocsc()).solve(motions)
         y[idle] = 0.0
@@ -197,7 +254,7 @@ def dual_program(
         unknown=unknown,
         null_space=null_space,
     )
-    return DualProgram(mu, lines, R, T, program)
+    return DualProblem(cells, given, prescribed, mu, elements, lines, R, T, program)
 
 
 def _joined(parts: Sequence[Any], kind: type = float) -> Any:
@@ -208,7 +265,7 @@ def _joined(parts: Sequence[Any], kind: type = float) -> Any:
 def _basis(
     mu: Multipliers, lines: Sequence[FacingSides], unknown: Index
 ) -> tuple[sp.csr_array, sp.csr_array]:
-    """`DualProgram.R` and `.T`, by the `unknown` (m,) of each row."""
+    """`DualProblem.R` and `.T`, by the `unknown` (m,) of each row."""
     d, m, own, across, solved = int(mu.start[-1]), 0, [], [], []
     plain = np.ones(d, dtype=bool)
     for line in lines:
@@ -234,21 +291,3 @@ def _basis(
     while (part := M @ part).nnz:  # as often as bodies stand in a row
         T = T + part
     return summed(own, (m, d)) + R, T
-
-
-def _of_unknowns(e: Element, T: sp.csr_array, other: Mask) -> list[tuple[Index, Array]]:
-    """Unknowns y (b, k) and N T (b, m, k) of triangles: of those without rows `other`, and with.
-
-    `other` (d,) are the rows of T that are not those of 1.
-    """
-    some = other[e.dofs].any(axis=1)
-    b, d = e.dofs[some].shape
-    rows = T[e.dofs[some].ravel()]
-    of, row = np.divmod(np.repeat(np.arange(b * d), np.diff(rows.indptr)), d)
-    key, place = np.unique(of * T.shape[1] + rows.indices, return_inverse=True)
-    start, end = np.searchsorted(key // T.shape[1], [np.arange(b), np.arange(1, b + 1)])
-    own = start[:, None] + np.arange((end - start).max(initial=0))
-    own = np.where(own < end[:, None], own, start[:, None])  # more have no moments
-    part = np.zeros((b, d, own.shape[1]))
-    part[of, row, place - start[of]] = rows.data
-    return [(e.dofs[~some], e.N[~some]), (key[own] % T.shape[1], e.N[some] @ part)]

@@ -83,7 +83,7 @@ class EquilibratedStress:
     @property
     def pressure(self) -> list[ContactPressure]:
         """p* of each pair."""
-        cells, lines = self.proof.dual.cells, self.proof.dual.program.lines
+        cells, lines = self.proof.dual.cells, self.proof.dual.lines
         found = zip(lines, self.proof.stress.pressure, self.proof.problem.contact, strict=False)
         return [ContactPressure(cells.segment[x.side], cells.span[x.side], p) for x, p, _ in found]
 
@@ -94,7 +94,7 @@ class EquilibratedStress:
         The divergence holds by construction; what is left are jumps of tractions between triangles
         and from the given ones.
         """
-        lines = zip(self.proof.dual.program.lines, self.proof.stress.pressure, strict=True)
+        lines = zip(self.proof.dual.lines, self.proof.stress.pressure, strict=True)
         least = [p.min(initial=0.0) for line, p in lines if not line.equality]
         return {
             "tractions": self.proof.stress.residual,
@@ -161,7 +161,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     ValueError
         Where cells have curved sides, or normals of drawn curves turn along straight ones.
     """
-    cells, lines, stress = proof.dual.cells, proof.dual.program.lines, proof.stress
+    cells, lines, stress = proof.dual.cells, proof.dual.lines, proof.stress
     turns = sum((np.ptp(f.direction, axis=1) > SAME_DIRECTION).any(axis=1).sum() for f in lines)
     if cells.curved.any() or turns:
         raise ValueError(
@@ -199,8 +199,9 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         }
     # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
     side = np.flatnonzero(~cells.inner)
-    numbers, _ = proof.dual.program.multipliers.of(side)
-    traction = proof.dual.moments[numbers].reshape(len(side), 2, -1)
+    numbers, _ = proof.dual.multipliers.of(side)
+    moments = proof.dual.given.moments(proof.dual.multipliers)
+    traction = moments[numbers].reshape(len(side), 2, -1)
     position = np.full(len(cells.ends) + 1, -1)  # the last one where no side is faced
     position[side] = np.arange(len(side))
     return arrays | {

@@ -34,16 +34,17 @@ class BoundaryData:
     normal: Array  # (m, j, 2) unit normals, out of the bodies
     loads: Array  # (m, j, 2) given tractions
 
-    def moments(self, mu: Multipliers) -> tuple[Array, Mask]:
-        """Moments (d,) of the loads with the multipliers, and which of these are fixed, (d,).
+    def fixed(self, mu: Multipliers) -> Mask:
+        """Multipliers (d,) of components with prescribed displacements."""
+        return np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))  # (3.7)
 
-        Fixed are those of components with prescribed displacements.
-        """
+    def moments(self, mu: Multipliers) -> Array:
+        """Moments (d,) of the loads with the multipliers."""
         found, load = np.zeros(int(mu.start[-1])), self.weight[..., None] * self.loads
         at, own = mu.of(self.side)
         parts = load.swapaxes(1, 2) @ traces(at.shape[1] // 2 - 1, POINTS)
         found[at[own]] = parts.reshape(at.shape)[own]
-        return found, np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))  # (3.7)
+        return found
 
     def work(self, tractions: Array, side: Index, direction: Array, amount: Array) -> float:
         """Work of `tractions` (m, j, 2) on a displacement of sides `side` (k,).
