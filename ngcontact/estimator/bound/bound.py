@@ -89,16 +89,11 @@ def error_bound(
     for one in unresolved(problem, trace.mesh, in_bounds=True):
         raise ValueError(f"{NO_BOUND} where {one}; refine the mesh there")
     try:
-        found = _bound(problem, trace, displacement, pairs, ())
+        return _bound(problem, trace, displacement, pairs, ())
     except ContactError:
         # Resultants that no polynomial pressure has, as of a body about to tilt, or rough forces of
         # which quadrature misses too much for a body that moves freely.
-        found = _bound(problem, trace, displacement, pairs, BESIDE_VERTICES)
-    if not np.isfinite(found.bound):
-        raise ValueError(
-            f"{NO_BOUND} for loads that are no polynomials beside the axis; use error_estimate"
-        )
-    return found
+        return _bound(problem, trace, displacement, pairs, BESIDE_VERTICES)
 
 
 def _bound(
@@ -191,6 +186,10 @@ def _proof(
     stress = dual.nearest(felt)
     # The identity.
     c, D = stress.distance, stress.loads
+    if not np.isfinite(D).all():
+        raise ValueError(
+            f"{NO_BOUND} for loads that are no polynomials at the axis; use error_estimate"
+        )
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
     parts = {
         "constitutive": float(c @ c),

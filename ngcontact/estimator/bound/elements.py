@@ -11,7 +11,7 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,12 +22,11 @@ from numpy.polynomial import legendre
 from ...arrays import Array, Index, Mask, rows_of
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
-from ...problem import MeshArrays, Problem, numbers, varies
+from ...problem import MeshArrays, Problem, numbers
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, alike, places
 from .polynomials import CORNERS, balancing, coordinates, edges, scalars, stresses
 
-TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
 CURVED_DEGREES = 2  # degrees by which stresses on triangles with a curved side are higher
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 FORCE_ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
@@ -197,6 +196,13 @@ class Multipliers:
         y = x + np.where(own, self.degree[side][..., None] + 1, 0)
         return np.concatenate([x, y], axis=-1), np.concatenate([own, own], axis=-1)
 
+    def moments(self, side: Index, t: Array, weighted: Array) -> Array:
+        """Moments (d,) of weighted values (k, j, 2) at `t` (j,) of sides `side` (k,)."""
+        found, (at, own) = np.zeros(int(self.start[-1])), self.of(side)
+        parts = weighted.swapaxes(1, 2) @ traces(at.shape[1] // 2 - 1, t)
+        found[at[own]] = parts.reshape(at.shape)[own]
+        return found
+
 
 def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) -> Array:
     """One array (n,) of `values` (b,) on each element's triangles, n in all."""
@@ -206,19 +212,9 @@ def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) ->
     return found
 
 
-def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
-    """The multipliers for stresses of a `degree`.
-
-    It is higher at curved sides and beside contact along normals that are not those of the mesh.
-    """
-    pairs = [pair for pair in problem.contact if pair.direction is None]
-    names = [name for pair in pairs for name in pair.sides]
-    side = np.tile(cells.sides_on(cells.trace.segments(*names)), 2)
-    segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
-    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
-    higher = cells.curved.copy()
-    higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED_NORMAL]]] = True
-    own, of_side = degree + CURVED_DEGREES * higher, np.zeros(len(cells.ends), dtype=np.intp)
+def multipliers(cells: Cells, degree: int) -> Multipliers:
+    """The multipliers for stresses of a `degree`, which is higher at curved sides."""
+    own, of_side = degree + CURVED_DEGREES * cells.curved, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
     return Multipliers(own, of_side, np.concatenate([[0], np.cumsum(2 * (of_side + 1))]))
 
@@ -228,21 +224,16 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
 
     Motions are those of bodies, translations of size 1 and turns about their middles.
     """
-    trace, e, highest = cells.trace, len(cells.ends), int(mu.degree.max())
-    bodies = connected_bodies(trace)
+    trace, bodies = cells.trace, connected_bodies(cells.trace)
     body = bodies.of_vertex[MeshArrays(trace.mesh).elements[cells.parent[cells.owner], 0]]
-    t, w = gauss(highest + trace.geometry_order)
-    x, _ = cells.points(np.arange(e), np.tile(t, (e, 1)))
+    t, w = gauss(int(mu.degree.max()) + trace.geometry_order)
+    x, _ = cells.points(np.arange(len(body)), np.tile(t, (len(body), 1)))
     arm = (x - bodies.middle[body, None]) / bodies.size[body, None, None]
-    motions = np.zeros((*arm.shape, 3))
-    motions[:, :, [0, 1], [0, 1]] = 1.0
-    motions[..., 2] = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
-    motions = motions[..., np.array(trace.model.motions)]
-    moments = np.einsum("q,qn,eqcr->ecnr", w, traces(highest, t), motions, optimize=True)
-    own = (np.arange(highest + 1) <= mu.degree[:, None])[:, None] & np.ones((2, 1), dtype=bool)
-    values = np.zeros((int(mu.start[-1]), len(bodies.names), motions.shape[-1]))
-    values[np.arange(len(values)), np.repeat(body, 2 * (mu.degree + 1))] = moments[own]
-    found = values.reshape(len(values), -1)
+    shifts = [np.broadcast_to(e, arm.shape) for e in np.eye(2)]
+    motions = np.stack([*shifts, arm @ CLOCKWISE.T])[np.array(trace.model.motions)]
+    own = [np.flatnonzero(body == k) for k in range(len(bodies.names))]
+    each = [mu.moments(k, t, w[:, None] * motion[k]) for k in own for motion in motions]
+    found = np.column_stack(each)
     return np.asarray(found @ vanishing_combinations(found[fixed]))
 
 
@@ -258,7 +249,7 @@ def elements_of(
     Stresses are of a `degree` on triangles with straight sides. Triangles of other cells that are
     `known` are not condensed again.
     """
-    mu, data = multipliers(problem, cells, degree), BodyData.of(problem, cells.trace.mesh)
+    mu, data = multipliers(cells, degree), BodyData.of(problem, cells.trace.mesh)
     highest = mu.degree[cells.sides].max(axis=1)
     varying = data.varies[cells.bodies]
     kind = [mu.of_stress, highest, cells.on_axis, cells.curved, varying]
@@ -292,29 +283,23 @@ class BodyData:
 
     stiffness: ng.CoefficientFunction  # C, Voigt
     force: ng.CoefficientFunction | None  # None without any
-    law_varies: Mask  # (n,)
     varies: Mask  # (n,) where a law, an initial strain or a force is no number
 
     @staticmethod
     def of(problem: Problem, mesh: ng.Mesh) -> BodyData:
         """The data of a problem."""
         laws = {k: law.voigt(problem.model) for k, law in problem.materials.items()}
-        forces = [k for k, force in problem.force.items() if not numbers(force)]
-
-        def where(patterns: Iterable[str]) -> Mask:
-            return np.any([list(mesh.Materials(k).Mask()) for k in ["", *patterns]], axis=0)
-
+        rough = [*problem.varying, *(k for k, F in problem.force.items() if not numbers(F))]
         return BodyData(
             mesh.MaterialCF(laws),
             mesh.MaterialCF(problem.force, default=ng.CF((0, 0))) if problem.force else None,
-            where(k for k, law in problem.materials.items() if varies(law)),
-            where([*problem.varying, *forces]),
+            np.any([list(mesh.Materials(k).Mask()) for k in ["", *rough]], axis=0),
         )
 
     def compliance(self, points: Places) -> Array:
-        """C^-1 at places, (b, q, v, v) or, where laws are numbers in all bodies, (b, 1, v, v)."""
+        """C^-1 at places, (b, q, v, v) or, where data are numbers in all bodies, (b, 1, v, v)."""
         cells = points.cells
-        if self.law_varies[cells.bodies[points.at]].any():
+        if self.varies[cells.bodies[points.at]].any():
             C = points.evaluate(self.stiffness)
         else:
             middle = np.full((1, 2), 1 / 3)

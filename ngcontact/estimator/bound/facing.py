@@ -132,7 +132,7 @@ class PressureSupport(NamedTuple):
     pair: ContactState
     # (k,) of the secondary: in contact, beside contact, or where u_h penetrates the other body
     segments: Index
-    contact: Array  # (r, 3) segments in which contact ends, with s where it begins and ends
+    contact: Array  # (r, 3) segments with contact, and s where it begins and ends on each
 
 
 def pressure_support(
@@ -143,7 +143,7 @@ def pressure_support(
     They do on each part between vertices of both bodies. Segments that face in part, as beside the
     end of a body, are examined in points.
     """
-    line, found = pair.line, list[tuple[float, float, float]]()
+    line = pair.line
     if line.contact.bilateral or not len(line.segments):
         segments = line.segments[~trace.on_axis[line.segments]]
         return PressureSupport(pair, segments, np.zeros((0, 3)))
@@ -158,6 +158,7 @@ def pressure_support(
         c, off = fitted(there.gap[smooth], degree)
         overlap[smooth] = c.min(axis=1, initial=np.inf) < off
         near[parts.local[overlap]] = True
+    found = [(k, 0.0, 1.0) for k in line.segments[active.all(axis=1)].tolist()]
     places, turns = trace.places(line.segments), np.diff(active.astype(int), axis=1)
     for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
         ends = [0.0] if active[i, 0] else []
@@ -181,13 +182,6 @@ def new_vertices(
     each other up to `SAME_VERTEX` get none.
     """
     length = trace.lengths(np.arange(len(trace.region)))
-    size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
-    np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
-
-    def nearest(k: Index, s: Array) -> tuple[Array, Array]:
-        """Distances (r,) of the nearer ends of segments (r,), and the `size` there."""
-        return np.minimum(s, 1 - s) * length[k], size[trace.nodes[k, np.where(s < 0.5, 0, -1)]]
-
     found = [np.zeros((0, 2))]
     for reach in reaches:
         line, own = reach.pair.line, reach.segments
@@ -200,9 +194,9 @@ def new_vertices(
             k = np.append(k, np.tile(own[parts.local], 2))
             s = np.concatenate([s, parts.start, parts.stop])
             s, (there, t) = _opposite(trace, reach.pair, k, s)
-            (away, here), (beyond, other) = nearest(k, s), nearest(there, t)
-            faced = there >= 0
-            apart = np.maximum(away, beyond) > SAME_VERTEX * np.minimum(here, other)
+            here, opposite, faced = length[k], length[there], there >= 0
+            away = np.maximum(np.minimum(s, 1 - s) * here, np.minimum(t, 1 - t) * opposite)
+            apart = away > SAME_VERTEX * np.minimum(here, opposite)
             found.append(np.column_stack([there, t])[faced & apart])
             k, s = k[~faced | apart], s[~faced | apart]
         found.append(np.column_stack([k, s]))
@@ -362,13 +356,10 @@ def facing_sides(
             )
     segment, s = cells.on_side(side, POINTS[None])
     ds = at_places(partial(jacobian, trace, contact), segment, s)
-    whole = line.on_segments(pair.active, False).all(axis=1)
     number, start, stop = reach.contact.T
     low, high = np.sort(cells.span[side], axis=1).T[..., None]
-    inside = (
-        (segment[:, None] == number) & (low >= start - SAME_PLACE) & (high <= stop + SAME_PLACE)
-    )
-    closed = np.isin(segment, line.segments[whole]) | inside.any(axis=1) | contact.bilateral
+    inside = (low >= start - SAME_PLACE) & (high <= stop + SAME_PLACE)
+    closed = ((segment[:, None] == number) & inside).any(axis=1) | contact.bilateral
     # Shares are as compliances: all where only one body can move, and one number at a vertex.
     alone = float(contact.primary is None)
     d_ends, opposite = np.einsum("ej,kjc->kec", TO_ENDS, d), np.zeros((len(side), 2))
@@ -385,7 +376,7 @@ def facing_sides(
     else:
         after, lift = _lifted_gap(vertices, gap, closed, total == 0, narrow, degree)
     vanishes = np.median(after, axis=1) <= 0
-    pressed = np.repeat((closed | vanishes)[:, None], of_pressure + 1, axis=1)
+    pressed = np.repeat(vanishes[:, None], of_pressure + 1, axis=1)
     touched = np.isin(vertices, vertices[closed])
     pressed[:, [0, -1]] |= touched
     return FacingSides(

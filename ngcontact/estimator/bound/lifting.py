@@ -190,7 +190,7 @@ def _stiffness(
     V = np.zeros((2, 2 + axial, 3 + axial))  # Voigt strains by component, of its derivatives
     V[0, 0, 0] = V[0, 1, -1] = V[1, 0, -1] = V[1, 1, 1] = 1.0
     V[0, 2:, 2:-1] = 1.0  # ... and of u_r / r
-    kind = [degrees[cells.sides], cells.curved, data.law_varies[cells.bodies]]
+    kind = [degrees[cells.sides], cells.curved, data.varies[cells.bodies]]
     for (*own, bent, varies), every in alike(kind, layer):
         inverse = _nodal(degree, *own)
         order, m = 2 * max(own) + 4 * bent, len(inverse)

@@ -50,16 +50,13 @@ class ContactPressure:
 
         At the end of two parts the one towards the middle of the segment.
         """
-        found, inside = np.zeros(len(segment)), np.clip(s, INSIDE_PART, 1 - INSIDE_PART)
-        if not len(self.segments):
-            return found
-        order = np.argsort(self.segments + self.span.min(axis=1))
-        start = (self.segments + self.span.min(axis=1))[order]
-        part = order[np.searchsorted(start, segment + inside, side="right") - 1]
+        inside, (low, high) = np.clip(s, INSIDE_PART, 1 - INSIDE_PART), np.sort(self.span).T
+        beside = (self.segments == segment[:, None]) & (low <= inside[:, None])
+        at, part = (beside & (inside[:, None] <= high)).nonzero()
         a, b = self.span[part].T
-        on = (self.segments[part] == segment) & ((inside - a) * (inside - b) <= 0)
-        basis = bernstein(self.coefficients.shape[1] - 1, ((s - a) / (b - a))[on])
-        found[on] = (basis * self.coefficients[part[on]]).sum(axis=1)
+        basis = bernstein(self.coefficients.shape[1] - 1, (s[at] - a) / (b - a))
+        found = np.zeros(len(segment))
+        found[at] = (basis * self.coefficients[part]).sum(axis=1)
         return found
 
 

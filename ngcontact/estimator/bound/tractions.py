@@ -13,7 +13,7 @@ from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem
 from ...quadrature import loads_of
 from .cells import Cells
-from .elements import Multipliers, traces
+from .elements import Multipliers
 from .facing import DATA_DEGREE, POINTS, WEIGHTS, FacingSides, jump
 
 FINEST_PARTS = 16  # of a side of an element: cells do not become smaller
@@ -40,11 +40,7 @@ class BoundaryData:
 
     def moments(self, mu: Multipliers) -> Array:
         """Moments (d,) of the loads with the multipliers."""
-        found, load = np.zeros(int(mu.start[-1])), self.weight[..., None] * self.loads
-        at, own = mu.of(self.side)
-        parts = load.swapaxes(1, 2) @ traces(at.shape[1] // 2 - 1, POINTS)
-        found[at[own]] = parts.reshape(at.shape)[own]
-        return found
+        return mu.moments(self.side, POINTS, self.weight[..., None] * self.loads)
 
     def work(self, tractions: Array, side: Index, direction: Array, amount: Array) -> float:
         """Work of `tractions` (m, j, 2) on a displacement of sides `side` (k,).
