@@ -36,11 +36,11 @@ class BoundaryData:
 
     def fixed(self, mu: Multipliers) -> Mask:
         """Multipliers (d,) of components with prescribed displacements."""
-        return np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))  # (3.7)
+        return np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
 
     def moments(self, mu: Multipliers) -> Array:
         """Moments (d,) of the loads with the multipliers."""
-        return mu.moments(self.side, POINTS, self.weight[..., None] * self.loads)
+        return mu.moments(self.side, POINTS, self.weight[..., None] * self.loads)  # (3.7)
 
     def work(self, tractions: Array, side: Index, direction: Array, amount: Array) -> float:
         """Work of `tractions` (m, j, 2) on a displacement of sides `side` (k,).
