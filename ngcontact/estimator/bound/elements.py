@@ -197,7 +197,7 @@ class Multipliers:
         return np.concatenate([x, y], axis=-1), np.concatenate([own, own], axis=-1)
 
     def moments(self, side: Index, t: Array, weighted: Array) -> Array:
-        """Moments (d,) of weighted values (k, j, 2) at `t` (j,) of sides `side` (k,)."""
+        """Moments (d,) of values at `t` (j,) of sides `side` (k,), `weighted` (k, j, 2)."""
         found, (at, own) = np.zeros(int(self.start[-1])), self.of(side)
         parts = weighted.swapaxes(1, 2) @ traces(at.shape[1] // 2 - 1, t)
         found[at[own]] = parts.reshape(at.shape)[own]
