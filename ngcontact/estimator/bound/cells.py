@@ -67,6 +67,13 @@ class Cells:
         return np.asarray(self.lengths[self.sides].max(axis=1))
 
     @cached_property
+    def turn(self) -> Array:
+        """Angles (n,) by which bases turn."""
+        _, slope = self.around(np.arange(len(self.triangles)), 0, np.array([0.0, 1.0]))
+        start, stop = (slope @ np.array([1.0, 1j])).T
+        return np.abs(np.angle(stop / start))
+
+    @cached_property
     def backward(self) -> Mask:
         """Whether t runs against the sense of each triangle's side, (n, 3)."""
         start = np.roll(self.triangles, -1, axis=1)

@@ -19,7 +19,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index, Mask, rows_of
+from ...arrays import Array, Index, Mask
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, numbers
@@ -92,14 +92,6 @@ class Element:
         some = np.minimum(np.searchsorted(own, at), len(own) - 1)
         mine = np.flatnonzero(own[some] == at)
         return mine, some[mine]
-
-    def part(self, rows: Index, cells: Cells, at: Index, mu: Multipliers) -> Element:
-        """Its triangles `rows` (r,), which are `at` (r,) of other `cells`, with multipliers mu."""
-        names = "compliance strain missed modulus combined N own g beyond".split()
-        places = replace(rows_of(self.places, rows, "x", "slopes", "weight"), cells=cells, at=at)
-        dofs = mu.of(cells.sides[at])[0].reshape(len(at), -1)
-        part = rows_of(self, rows, *names)
-        return replace(part, places=places, basis=self.basis.part(rows), dofs=dofs)
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
@@ -242,39 +234,20 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    known: tuple[Cells, Multipliers, Sequence[Element]] | None = None,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
-    Stresses are of a `degree` on triangles with straight sides. Triangles of other cells that are
-    `known` are not condensed again.
+    Stresses are of a `degree` on triangles with straight sides.
     """
     mu, data = multipliers(cells, degree), BodyData.of(problem, cells.trace.mesh)
     highest = mu.degree[cells.sides].max(axis=1)
     varying = data.varies[cells.bodies]
     kind = [mu.of_stress, highest, cells.on_axis, cells.curved, varying]
-    strain, found, rest = elastic_strain(problem, displacement), [], np.ones(len(highest), bool)
-    if known is not None:
-        both = (_identity(*known[:2]), _identity(cells, mu))
-        _, first, same = np.unique(
-            np.concatenate(both), axis=0, return_index=True, return_inverse=True
-        )
-        before = first[same.ravel()[len(both[0]) :]]
-        rest &= before >= len(both[0])
-        for e in known[2]:
-            at, rows = e.among(before)
-            if at.size:
-                found.append(e.part(rows, cells, at, mu))
-    for (n, *_), every in alike(kind, np.flatnonzero(rest)):
+    strain, found = elastic_strain(problem, displacement), []
+    for (n, *_), every in alike(kind, np.arange(len(highest))):
         for at in np.array_split(every, 1 + len(every) * (n + 2) ** 4 // BATCH_ENTRIES):
             found.append(_element(data, cells, strain, mu, at))
     return mu, found
-
-
-def _identity(cells: Cells, mu: Multipliers) -> Array:
-    """Rows (n, 14) of numbers that are the same for triangles which are condensed alike."""
-    parts = cells.parent, cells.corners, mu.of_stress, mu.degree[cells.sides], cells.backward
-    return np.column_stack([np.asarray(x, dtype=float).reshape(len(x), -1) for x in parts])
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,6 @@ from .polynomials import edges
 from .tractions import FINEST_PARTS, boundary_data
 
 EQUILIBRIUM_RESIDUAL = 1e-10  # residual of equilibrium, relative to the largest stress
-CURVED_RATIO = 0.125  # of D_T on half of a triangle with a curved side, at least expected
 POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
@@ -90,8 +89,7 @@ def divided(
     """Cells so small that data add little to a bound; the same where they are.
 
     `norms` (n,) are |s - sigma_h| and D_T on the `cells`, from elements on `parts` of these. On
-    smaller cells D_T is that of the loads, and on curved ones a part of the former; `linked` is as
-    of `bisected`.
+    smaller cells D_T is that of the loads; `linked` is as of `bisected`.
     """
     distance, D = norms
     limit, ne = (NEGLIGIBLE_SHARE * float(np.linalg.norm(distance))) ** 2, cells.trace.mesh.ne
@@ -119,8 +117,7 @@ def divided(
         near = P @ ((P.T * WEIGHTS) @ given.loads)
         sides = given.missed(near, (), (), float(np.abs(near).max(initial=0.0)))
         found = oscillation_norms(cells, missed, moduli[cells.parent], sides)
-        D = D[whole]
-        D[new] = np.maximum(found[new], CURVED_RATIO * cells.curved[new] * D[new])
+        D = np.where(np.bincount(whole)[whole] > 1, found, D[whole])
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
