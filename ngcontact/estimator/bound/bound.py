@@ -140,7 +140,7 @@ def _bound(
     if found.parts["loads"] <= NEGLIGIBLE_LOADS * found.parts["constitutive"]:
         return found
     c, D = (np.sqrt(np.bincount(whole, x**2)) for x in (found.stress.distance, found.stress.loads))
-    cells = divided(problem, cells, (parts, found.dual.elements), (c, D), linked)
+    cells = divided(problem, cells, found.dual.elements, (c, D), linked)
     parts, _ = parted(cells, dependent(cells, loaded, supported))
     other = _proof(problem, parts, displacement, reaches)
     return min(found, other, key=lambda proof: proof.bound)

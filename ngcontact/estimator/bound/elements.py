@@ -86,13 +86,6 @@ class Element:
     beyond: Array  # (b,) squares of |C e(u_h) - s_p - T g|, which no coefficients reach
     dofs: Index  # (b, d) numbers of the multipliers
 
-    def among(self, at: Index) -> tuple[Index, Index]:
-        """Numbers (r,) of its own in triangles `at` (k,), and their places among its own, (r,)."""
-        own = self.places.at
-        some = np.minimum(np.searchsorted(own, at), len(own) - 1)
-        mine = np.flatnonzero(own[some] == at)
-        return mine, some[mine]
-
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
         return np.asarray(self.own + (c[:, None] @ self.N)[:, 0])
@@ -137,9 +130,11 @@ class Stress:
         """
         found = np.empty((len(at), local.shape[-2], self.elements[0].strain.shape[2]))
         for e, c in zip(self.elements, self.coefficients, strict=True):
-            mine, some = e.among(at)
+            own = e.places.at
+            some = np.minimum(np.searchsorted(own, at), len(own) - 1)
+            mine = np.flatnonzero(own[some] == at)
             if mine.size:
-                found[mine] = e.stress(c, local if local.ndim == 2 else local[mine], some)
+                found[mine] = e.stress(c, local if local.ndim == 2 else local[mine], some[mine])
         return found
 
     def tractions(self, at: Index, x: Array, normal: Array) -> Array:

@@ -41,7 +41,7 @@ SIDE_OVERHANG = 1e-9  # of a side, by which it may exceed the one it faces; 1e-1
 CONTACT_MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 VERTEX_DISTANCE = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 NARROW_SIDE = 0.1  # of the sides beside it, a side between them on which r does not change
-PARALLEL_MOTION = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
+ACROSS_MOTION = 0.1  # cosine of the angle to prescribed motions, up to which d is across them
 POINTS, WEIGHTS = gauss(2 * DATA_DEGREE)
 # From values at `POINTS` to Legendre's coefficients, and to values at Gauss-Lobatto points.
 LEGENDRE = legendre.legvander(2 * POINTS - 1, DATA_DEGREE)
@@ -308,7 +308,7 @@ def facing_sides(
     """The sides on which p* of a pair acts, with the lifted gap; `degrees` are those of both.
 
     Both bodies share the lifting by compliance, one over the `moduli` (n,) of the cells, but for
-    vertices that cannot move along d; `held` (nv, 2, 2) are the projections of `held_motions`.
+    vertices that cannot move along d; `held` (nv, 2, 2) are the squares of `held_motions`.
 
     Raises
     ------
@@ -400,7 +400,7 @@ def facing_sides(
 def held_motions(
     cells: Cells, held: Sequence[tuple[Index, Array]], supports: Sequence[PressureSupport]
 ) -> Array:
-    """Projections (nv, 2, 2) of motions of all vertices on those that conditions prescribe.
+    """Squares (nv, 2, 2) of the motions that conditions prescribe, summed at all vertices.
 
     Sides and directions at their ends that are `held` (k,) and (k, 2, 2), of each condition, and
     those of guides and bilateral obstacles.
@@ -413,13 +413,12 @@ def held_motions(
             held.append((side, at_places(partial(rays, cells.trace, contact), *ends)))
     for side, d in held:
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
-    return np.asarray(M @ np.linalg.pinv(M, rcond=PARALLEL_MOTION**2, hermitian=True))
+    return M
 
 
 def _moves(held: Array, d: Array) -> Mask:
-    """Whether vertices (k, 2) can move along `d` (k, 2, 2); `held` (k, 2, 2, 2) are projections."""
-    rest = d - (held @ d[..., None])[..., 0]
-    return np.asarray(np.linalg.norm(rest, axis=2) > PARALLEL_MOTION)
+    """Whether vertices (k, 2) can move along `d` (k, 2, 2); `held` are as of `held_motions`."""
+    return np.einsum("kec,kecb,keb->ke", d, held, d) <= ACROSS_MOTION**2
 
 
 def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:

@@ -82,23 +82,23 @@ def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, ...]:
 def divided(
     problem: Problem,
     cells: Cells,
-    parts: tuple[Cells, Sequence[Element]],
+    elements: Sequence[Element],
     norms: tuple[Array, Array],
     linked: Callable[[Cells], tuple[Index, Index, Array]],
 ) -> Cells:
     """Cells so small that data add little to a bound; the same where they are.
 
-    `norms` (n,) are |s - sigma_h| and D_T on the `cells`, from elements on `parts` of these. On
+    `norms` (n,) are |s - sigma_h| and D_T on the `cells`, from `elements` on parts of these. On
     smaller cells D_T is that of the loads; `linked` is as of `bisected`.
     """
     distance, D = norms
     limit, ne = (NEGLIGIBLE_SHARE * float(np.linalg.norm(distance))) ** 2, cells.trace.mesh.ne
     finest = cells.elements.sizes / FINEST_PARTS
     moduli, degree = np.full(ne, np.inf), np.zeros(ne, dtype=np.intp)
-    parent = parts[0].parent
-    for e in parts[1]:
-        np.minimum.at(moduli, parent[e.places.at], e.modulus)
-        np.maximum.at(degree, parent[e.places.at], e.basis.degree)
+    for e in elements:
+        parent = e.places.cells.parent[e.places.at]
+        np.minimum.at(moduli, parent, e.modulus)
+        np.maximum.at(degree, parent, e.basis.degree)
     force = cells.trace.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
     while True:
         order = np.argsort(D)
