@@ -3,32 +3,23 @@
 Constants of Poincare (Payne, Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003), of
 Korn (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3) and of traces are known
 for each triangle; docs/bounds.md has the proof. Extrema on curves are taken over points.
-
-Where F or P are no polynomials s balances projections of them. Cells on which that counts are
-divided, and the bound is made again.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 
-import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from ...problem import Problem, numbers
-from .cells import Cells, alike, bisected, places
-from .elements import Element, Multipliers, projection, traces
-from .facing import POINTS, WEIGHTS
+from .cells import Cells
+from .elements import Multipliers
 from .polynomials import edges
-from .tractions import FINEST_PARTS, boundary_data
 
 EQUILIBRIUM_RESIDUAL = 1e-10  # residual of equilibrium, relative to the largest stress
 POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
-NEGLIGIBLE_SHARE = 0.03  # of |s - sigma_h|: so much data may miss on cells that stay as they are
 
 
 def oscillation_norms(cells: Cells, forces: Array, moduli: Array, tractions: Array) -> Array:
@@ -77,47 +68,6 @@ def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, ...]:
     measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), 3 * points).min(axis=1)
     trace = np.sqrt(2 * (p**2 + far * p) / least)
     return poincare, trace, np.sqrt(1 + 2 / beta**2), measure
-
-
-def divided(
-    problem: Problem,
-    cells: Cells,
-    elements: Sequence[Element],
-    norms: tuple[Array, Array],
-    linked: Callable[[Cells], tuple[Index, Index, Array]],
-) -> Cells:
-    """Cells so small that data add little to a bound; the same where they are.
-
-    `norms` (n,) are |s - sigma_h| and D_T on the `cells`, from `elements` on parts of these. On
-    smaller cells D_T is that of the loads; `linked` is as of `bisected`.
-    """
-    distance, D = norms
-    limit, ne = (NEGLIGIBLE_SHARE * float(np.linalg.norm(distance))) ** 2, cells.trace.mesh.ne
-    finest = cells.elements.sizes / FINEST_PARTS
-    moduli, degree = np.full(ne, np.inf), np.zeros(ne, dtype=np.intp)
-    for e in elements:
-        parent = e.places.cells.parent[e.places.at]
-        np.minimum.at(moduli, parent, e.modulus)
-        np.maximum.at(degree, parent, e.basis.degree)
-    force = cells.trace.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
-    while True:
-        order = np.argsort(D)
-        marked = np.zeros(len(D), dtype=bool)
-        marked[order[np.cumsum(D[order] ** 2) > limit]] = True
-        marked &= cells.diameters > finest[cells.parent]
-        if not marked.any():
-            return cells
-        cells, whole = bisected(cells, marked, linked)
-        missed, new = np.zeros(len(whole)), np.flatnonzero(np.bincount(whole)[whole] > 1)
-        rough = new[: 0 if all(map(numbers, problem.force.values())) else None]
-        for (n, _), at in alike([degree[cells.parent], cells.curved], rough):
-            own = n - 1 - cells.trace.model.extent
-            missed[at] = projection(force, places(cells, at, 2 * n + 4), own)[1]
-        given, P = boundary_data(problem, cells), traces(int(degree.min()), POINTS)
-        near = P @ ((P.T * WEIGHTS) @ given.loads)
-        sides = given.missed(near, (), (), float(np.abs(near).max(initial=0.0)))
-        found = oscillation_norms(cells, missed, moduli[cells.parent], sides)
-        D = np.where(np.bincount(whole)[whole] > 1, found, D[whole])
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
