@@ -64,22 +64,18 @@ def pressure_correction(
     pressures = ng.L2(mesh, order=solution.order, dgjumps=True)
     motions = ng.VectorH1(mesh, order=solution.order, definedon=region)
     (delta, t), (v, w) = pressures.TnT(), motions.TnT()
-
-    def constant(values: Array) -> ng.GridFunction:
-        function = ng.GridFunction(ng.L2(mesh, order=0))
-        function.vec.FV().NumPy()[:] = values
-        return function
-
-    element, edge = constant(solution.element_weight), constant(solution.edge_weight)
+    bulk = moduli_of(problem, mesh).bulk / solution.modulus
+    weights = solution.element_weight, solution.edge_weight, solution.mu, bulk
+    element, edge, mu, kappa = map(solution.on_elements, weights)
     edge = (edge + edge.Other()) / 2
-    mu, kappa = constant(solution.mu), constant(moduli_of(problem, mesh).bulk / solution.modulus)
     bedding = FLOATING / float(np.ptp(solution.boundary.curve, axis=(0, 1)).max()) ** 2
-    inside = ng.dx(definedon=region, bonus_intorder=model.bonus + CURVED)
-    skeleton = ng.dx(skeleton=True, bonus_intorder=2)
+    bonus = model.bonus + CURVED
+    dx, inside = ng.dx(bonus_intorder=bonus), ng.dx(definedon=region, bonus_intorder=bonus)
+    skeleton = ng.dx(skeleton=True, bonus_intorder=CURVED)
     a, f = ng.BilinearForm(pressures, symmetric=True), ng.LinearForm(pressures)
-    a += weighted(element * ng.Grad(delta) * ng.Grad(t) + delta * t / kappa) * ng.dx
+    a += weighted(element * ng.Grad(delta) * ng.Grad(t) + delta * t / kappa) * dx
     a += weighted(edge * (delta - delta.Other()) * (t - t.Other())) * skeleton
-    f += weighted(-element * divergence * ng.Grad(t)) * ng.dx(bonus_intorder=2)
+    f += weighted(-element * divergence * ng.Grad(t)) * dx
     f += weighted(-edge * (jump * n) * (t - t.Other())) * skeleton
     b = ng.BilinearForm(trialspace=pressures, testspace=motions)
     b += weighted(delta * model.volume(w)) * inside
@@ -112,6 +108,7 @@ def pressure_correction(
     found = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
     delta, v = ng.GridFunction(pressures), ng.GridFunction(motions)
     delta.vec.FV().NumPy()[:], v.vec.FV().NumPy()[:] = found[:size], found[size:]
+    order = 2 * solution.order + bonus
     density = weighted(delta**2 / kappa + mu * model.gradients(v, v))
     return PressureCorrection(
         divergence=ng.Grad(delta),
@@ -120,7 +117,7 @@ def pressure_correction(
             (one @ found[:size]).reshape(term.residual.shape)
             for one, term in zip(every, terms, strict=True)
         ],
-        squares=np.asarray(ng.Integrate(density, region, element_wise=True)),
+        squares=np.asarray(ng.Integrate(density, region, order=order, element_wise=True)),
     )
 
 

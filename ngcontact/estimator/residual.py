@@ -41,12 +41,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two, root_of_squares
-from ..fem import (
-    NEARLY_INCOMPRESSIBLE,
-    law_measures,
-    nearly_incompressible,
-    rough_moduli,
-)
+from ..fem import NEARLY_INCOMPRESSIBLE, law_measures, nearly_incompressible, rough_moduli
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
 from ..quadrature import features_of, loads_of, rough_segments
@@ -366,10 +361,8 @@ def _body_forces(
         body, F = load.name, load.data
         forces[body] = ng.CF(F) * (1 / solution.unit)
         if found := load.where_rough(solution.order):
-            rough = ng.GridFunction(ng.L2(mesh, order=0))
-            rough.vec.FV().NumPy()[:] = found.rough
             projection = found.projection * (1 / solution.unit)
-            forces[body] = ng.IfPos(rough, projection, forces[body])
+            forces[body] = ng.IfPos(solution.on_elements(found.rough), projection, forces[body])
             weight = solution.element_weight * solution.measure
             missed = weight * (found.projection_error / solution.unit) ** 2
             squares += [Squares("element", every, missed), solution.missed(every, found.missed)]

@@ -152,6 +152,12 @@ class ScaledSolution:
         """Test function that is constant on each element."""
         return ng.L2(self.mesh, order=0).TestFunction()
 
+    def on_elements(self, values: Array | Mask) -> ng.GridFunction:
+        """The function that has `values` (ne,) on the elements."""
+        function = ng.GridFunction(self.constant.space)
+        function.vec.FV().NumPy()[:] = values
+        return function
+
     @cached_property
     def measure(self) -> Array:
         """Measure of the body over that of the mesh, in the middle of elements, (ne,)."""
@@ -227,8 +233,7 @@ def edge_integral(solution: ScaledSolution, jump: ng.CoefficientFunction, order:
     piece = solution.boundary.arrays.pieces[solution.boundary.arrays.elements[:, 0]]
     if all(np.ptp(mu[piece == k]) == 0 for k in range(piece.max() + 1)):
         return _assembled(v, squares * dx)
-    soft = ng.GridFunction(v.space)
-    soft.vec.FV().NumPy()[:] = 1 / mu
+    soft = solution.on_elements(1 / mu)
     least = ng.IfPos(soft - soft.Other(), soft.Other(), soft)
     return mu * _assembled(v, least * squares * dx)
 
