@@ -50,7 +50,6 @@ CORNERS = {1: _rule((1, 0, 0), (0, 0, 0)), 2: _rule((1, 0, 0), (0, 1, 0), (0, 0,
 ELEMENTS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra, prisms or pyramids")}
 
 OVERLAP_SHARE = 0.5  # of the smaller of two bodies, from which they lie on top of each other
-SKEW = (0.83, 0.29, 0.47)  # a direction in which no mesh has edges
 SAMPLE_PLACES = 200  # of a connected piece that are looked for in another one
 PLANE_EXTENT = 1e-6  # extent along z of faces that lie in a plane, relative to those in it
 FLATNESS = 16 * np.finfo(float).eps  # measure of an element over its longest edge^d, without height
@@ -292,22 +291,13 @@ def check_overlaps(view: MeshArrays) -> None:
 
 
 def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
-    """Mask (k,) of the `points` (k, d) in the elements `part` (n,) of a mesh.
-
-    Where a ray crosses their boundary, the sides of one element alone, an odd number of times.
-    """
-    sides = view.sides[part].reshape(-1, view.dim)
-    _, first, count = np.unique(view.keys(sides), return_index=True, return_counts=True)
-    corners = view.vertices[sides[first[count == 1]]]
-    ray = np.array(SKEW[: view.dim])
+    """Mask (k,) of the `points` (k, d) in the elements `part` (n,) of a mesh."""
+    point, element = view.near(points)
+    corners = view.corners[element]
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    system = np.concatenate([edges, np.tile(-ray[:, None], (len(corners), 1, 1))], axis=2)
-    across = np.linalg.det(system) != 0
-    at = np.einsum(
-        "fij,kfj->kfi", np.linalg.inv(system[across]), points[:, None] - corners[across, 0]
-    )
-    crossed = (at > 0).all(axis=2) & (at[..., :-1].sum(axis=2) < 1)
-    return np.asarray(crossed.sum(axis=1) % 2 == 1)
+    at = np.linalg.solve(edges, (points[point] - corners[:, 0])[..., None])[..., 0]
+    inside = (at >= 0).all(axis=1) & (at.sum(axis=1) <= 1) & np.isin(element, part)
+    return np.isin(np.arange(len(points)), point[inside])
 
 
 def check_values(

@@ -13,6 +13,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from ..arrays import Array, Index, Mask
 
@@ -175,6 +176,20 @@ class MeshArrays:
     def keys(self, vertices: Index) -> Index:
         """Numbers (k, ...) of sets of `vertices` (k, ..., d), whatever the order of these is."""
         return np.sort(vertices, axis=-1) @ len(self.vertices) ** np.arange(self.dim)[::-1]
+
+    def near(self, points: Array, reach: float = 1.0) -> tuple[Index, Index]:
+        """Numbers (q,) of `points` (k, d) and of elements (q,) in whose balls they lie.
+
+        About the middle of the vertices, `reach` times as large as to contain these.
+        """
+        corners, middle = self.corners, self.corners.mean(axis=1)
+        radius = reach * np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+        r = radius[:, None]
+        some = np.flatnonzero(((low <= middle + r) & (middle - r <= high)).all(axis=1))
+        found = KDTree(points).query_ball_point(middle[some], radius[some])
+        element = np.repeat(some, [len(numbers) for numbers in found])
+        return np.concatenate([*found, []]).astype(np.intp), element
 
     def without_simplices(self) -> int:
         """Number of elements that are no simplices."""

@@ -9,7 +9,6 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ..arrays import Array, Index, distances_along, joined, rows_of
 from ..fem import BoundaryTrace, von_mises
@@ -42,9 +41,6 @@ class Location:
 def locate(trace: BoundaryTrace, points: Array) -> Location:
     """Elements that contain `points` (k, d), or lie beside those between the mesh and the CAD."""
     view = MeshArrays(trace.mesh)
-    corners, middle = view.corners, view.corners.mean(axis=1)
-    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1) * CURVED_RADIUS
-    size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
     # Boundary facet (ne, d + 1) opposite to each vertex of an element; -1 inside.
     keys, known = view.keys(view.sides), view.keys(view.facets)
     order = np.argsort(known)
@@ -53,16 +49,13 @@ def locate(trace: BoundaryTrace, points: Array) -> Location:
 
     def located(at: Index) -> Location:
         """Elements of the points numbered `at` (j,)."""
-        x, r = points[at], radius[:, None]
-        low, high = x.min(axis=0, initial=np.inf), x.max(axis=0, initial=-np.inf)
-        some = np.flatnonzero(((low <= middle + r) & (middle - r <= high)).all(axis=1))
-        near = KDTree(x).query_ball_point(middle[some], radius[some])
-        element = np.repeat(some, [len(numbers) for numbers in near])
-        point = at[np.concatenate([*near, []]).astype(np.intp)]
-        reference = _references(trace, corners[element], points[point], element)
+        point, element = view.near(points[at], CURVED_RADIUS)
+        point, corners = at[point], view.vertices[view.elements[element]]
+        reference = _references(trace, corners, points[point], element)
         share = np.column_stack([reference, 1 - reference.sum(axis=1)])
         noise = COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1)
-        tolerance = INSIDE_COORDINATE + noise / size[element]
+        size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
+        tolerance = INSIDE_COORDINATE + noise / size
         outside = ~(share >= -tolerance[:, None])  # so a NaN is outside
         inside = ~outside.any(axis=1)
         key = point * len(trace.mesh.GetMaterials()) + view.bodies[element]
