@@ -153,9 +153,7 @@ def check_numbers(view: MeshArrays) -> None:
             f"mesh, one with the vertices {corners}: what acts there would count twice; give every "
             "side one name"
         )
-    local = list(itertools.combinations(range(view.dim + 1), view.dim))
-    _, elements = np.unique(view.keys(view.elements[:, local]), return_counts=True)
-    outer = np.count_nonzero(elements == 1)
+    outer = np.count_nonzero(np.unique(view.keys(view.sides), return_counts=True)[1] == 1)
     if outer != (named := np.count_nonzero(~view.inner_facets)):
         raise ValueError(
             f"the boundaries of the mesh have {named} of its {outer} outer sides, and estimates "

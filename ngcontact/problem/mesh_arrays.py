@@ -91,7 +91,7 @@ class MeshArrays:
         corners = records[:, PARAMETERS : PARAMETERS + 72]  # a number, u and v of each
         return np.ascontiguousarray(corners).view(float).reshape(-1, 3, 3)[..., 1:]
 
-    @property
+    @cached_property
     def corners(self) -> Array:
         """Coordinates (ne, d + 1, d) of the vertices of each element, lengths."""
         return self.vertices[self.elements]

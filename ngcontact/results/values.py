@@ -41,6 +41,7 @@ class Location:
 def locate(trace: BoundaryTrace, points: Array) -> Location:
     """Elements that contain `points` (k, d), or lie beside those between the mesh and the CAD."""
     view = MeshArrays(trace.mesh)
+    size = np.linalg.norm(np.ptp(view.corners, axis=1), axis=1)
     # Boundary facet (ne, d + 1) opposite to each vertex of an element; -1 inside.
     keys, known = view.keys(view.sides), view.keys(view.facets)
     order = np.argsort(known)
@@ -50,12 +51,11 @@ def locate(trace: BoundaryTrace, points: Array) -> Location:
     def located(at: Index) -> Location:
         """Elements of the points numbered `at` (j,)."""
         point, element = view.near(points[at], CURVED_RADIUS)
-        point, corners = at[point], view.vertices[view.elements[element]]
-        reference = _references(trace, corners, points[point], element)
+        point = at[point]
+        reference = _references(trace, view.corners[element], points[point], element)
         share = np.column_stack([reference, 1 - reference.sum(axis=1)])
         noise = COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1)
-        size = np.linalg.norm(np.ptp(corners, axis=1), axis=1)
-        tolerance = INSIDE_COORDINATE + noise / size
+        tolerance = INSIDE_COORDINATE + noise / size[element]
         outside = ~(share >= -tolerance[:, None])  # so a NaN is outside
         inside = ~outside.any(axis=1)
         key = point * len(trace.mesh.GetMaterials()) + view.bodies[element]
