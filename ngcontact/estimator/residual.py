@@ -146,7 +146,8 @@ def on_supports_and_loads(solution: ScaledSolution, points: BoundaryPoints) -> B
     for pattern in problem.traction:
         at, load = boundary.lies_on(segment, pattern), problem.traction_vector(pattern)
         residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
-    factor = -boundary.normal(segment, s)  # of a pressure in the residual
+    # Of a pressure in the residual; those of solids are not corrected.
+    factor = -boundary.normal(segment, s) if plane else np.zeros_like(residual)
     squares = _rough_tractions(solution, segment, s, residual)
     for pattern, data in problem.displacement.items():  # (3.6)
         at = boundary.lies_on(segment, pattern)

@@ -225,15 +225,12 @@ def symmetry_line(solution: Solved, pattern: str, place: Array, slack: float) ->
 
     To both sides of it, farther than a `slack`, there are no nodes of those at `place` (n, 2).
     """
-    mesh, displacement = solution.mesh, solution.displacement
-    region = mesh.Boundaries(pattern)
-    if not any(region.Mask()):
-        names = sorted(set(mesh.GetBoundaries()))
+    trace, displacement = solution.discrete.space.trace, solution.displacement
+    at = trace.at_nodes(trace.segments(pattern))
+    if not len(at[0]):
+        names = sorted(set(solution.mesh.GetBoundaries()))
         raise ValueError(f'mirror = "{pattern}" is no boundary; there are {", ".join(names)}')
-    rule = ng.IntegrationRule([(0.0, 0, 0), (0.5, 0, 0), (1.0, 0, 0)], [0.0] * 3)
-    read = ng.CF((ng.x, ng.y, *displacement))(mesh.MapToAllElements(rule, region))
-    found = np.asarray(read, dtype=float).reshape(-1, 4)
-    x, u = found[:, :2], found[:, 2:]
+    x, u = trace.point(*at), trace.evaluate(displacement, *at)
     middle = x.mean(axis=0)
     line = SymmetryLine(middle, np.linalg.svd(x - middle, full_matrices=False)[2][1])
     if (np.abs(line.distance(x)) > slack).any():
