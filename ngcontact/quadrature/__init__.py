@@ -9,7 +9,6 @@ from .features import features_of as features_of
 from .features import unresolved as unresolved
 from .features import where_features_are as where_features_are
 from .loads import Load as Load
-from .loads import has_rough_loads as has_rough_loads
 from .loads import loads_of as loads_of
 from .loads import rough_load as rough_load
 from .loads import rough_segments as rough_segments

@@ -104,11 +104,6 @@ def loads_of(problem: Problem, mesh: ng.Mesh) -> list[Load]:
     return [*forces, *tractions]
 
 
-def has_rough_loads(problem: Problem, mesh: ng.Mesh, order: int) -> bool:
-    """Whether quadrature of the usual order would miss a part of a load."""
-    return any(load.where_rough(order) for load in loads_of(problem, mesh))
-
-
 def rough_load(
     load: ng.CoefficientFunction, region: ng.Region, degree: int, features: Array = NO_JUMPS
 ) -> RoughLoad | None:

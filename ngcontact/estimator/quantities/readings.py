@@ -34,7 +34,7 @@ from ...contact import area_in_contact as area_on_surface
 from ...discrete import load_by_shape
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace, FacetTrace, load_vector, model_of, stress_of
-from ...quadrature import has_rough_loads
+from ...quadrature import loads_of
 from ...solved import Solved
 from ..bound import WORK_BONUS, EquilibratedStress, Guaranteed, force_bar
 from ..residual import Estimated
@@ -276,7 +276,8 @@ def _force_error(solution: Guaranteed, pair: int, e: Array) -> float:
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
     if len(solution.pairs[pair].line.node) == 0:
         raise ValueError("the points of this pair belong to other pairs, which have its force")
-    if has_rough_loads(solution.problem, solution.mesh, solution.order):
+    loads = loads_of(solution.problem, solution.mesh)
+    if any(load.where_rough(solution.order) for load in loads):
         raise ValueError("loads that are rougher than the mesh count as they are integrated")
     states, space, u = solution.pairs, solution.discrete.space, solution.displacement
     directions = [e if number == pair else 0 * e for number in range(len(states))]
