@@ -14,8 +14,10 @@ import numpy as np
 
 from . import __version__
 from .adaptivity import RefinementTree
+from .discrete import DiscreteProblem
 from .estimator import Measured
 from .output import Profile, Unit, plot_solids, plot_solution, write_revolved, write_solution
+from .qp import Iterate
 from .results import (
     Number,
     Values,
@@ -229,6 +231,31 @@ class Solution(Measured):
         draw(self, path, scale, field=field, limits=limits, **options)
 
     __repr__ = __str__  # instead of all arrays
+
+
+def solution_of(
+    minimiser: Iterate, tried: Sequence[DiscreteProblem], element: str, curved: int
+) -> Solution:
+    """The solution of the last of the problems `tried`, with counts of what all of them took."""
+    discrete, trace = tried[-1], tried[-1].space.trace
+    work = {
+        "assemblies": sum(one.assembled for one in tried),
+        "factorizations": minimiser.factorizations,
+        "back_solves": minimiser.back_solves,
+        "gap_searches": sum(line.searches for one in tried for line in one.lines),
+        "curved_elements": curved,
+    }
+    return Solution(
+        problem=discrete.problem,
+        mesh=trace.mesh,
+        order=trace.order,
+        element=element,
+        displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
+        discrete=discrete,
+        minimiser=minimiser,
+        work=work | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
+        tree=RefinementTree(trace.mesh, np.arange(trace.mesh.ne)),
+    )
 
 
 def load(path: str | os.PathLike[str]) -> Solution:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -225,39 +224,6 @@ class Solved:
         `complementarity`: sum of force times gap over force times length.
         """
         return kkt_residuals(self.discrete.program, self.minimiser)
-
-
-Kind = TypeVar("Kind", bound=Solved)
-
-
-def made_of(
-    kind: type[Kind],
-    minimiser: Iterate,
-    tried: Sequence[DiscreteProblem],
-    element: str,
-    curved: int,
-    **others: Any,
-) -> Kind:
-    """The solution of the last of the problems `tried`, with counts of what all of them took."""
-    discrete = tried[-1]
-    work = {
-        "assemblies": sum(one.assembled for one in tried),
-        "factorizations": minimiser.factorizations,
-        "back_solves": minimiser.back_solves,
-        "gap_searches": sum(line.searches for one in tried for line in one.lines),
-        "curved_elements": curved,
-    }
-    return kind(
-        problem=discrete.problem,
-        mesh=discrete.space.trace.mesh,
-        order=discrete.space.trace.order,
-        element=element,
-        displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
-        discrete=discrete,
-        minimiser=minimiser,
-        work=work | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
-        **others,
-    )
 
 
 def full_stress(solution: Solved) -> ng.CoefficientFunction:

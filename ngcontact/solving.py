@@ -49,8 +49,7 @@ from .plausibility import (
 from .problem import Contact, MeshArrays, Problem
 from .quadrature import evaluations, sample_data, unresolved
 from .results import with_progress
-from .solution import Solution
-from .solved import made_of
+from .solution import Solution, solution_of
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 COARSE_RUN_FROM = 20_000
@@ -199,8 +198,7 @@ def solve_on(
         else:
             active = carried_active_set(discrete.lines, start.expected)
         minimiser = minimise_energy(discrete, active)
-        tree = RefinementTree(mesh, np.arange(mesh.ne))
-        solution = made_of(Solution, minimiser, tried, element, curved, tree=tree)
+        solution = solution_of(minimiser, tried, element, curved)
         solution.work["evaluations"] = evaluations() - before
         if discrete.rigid is None:
             return solution, None

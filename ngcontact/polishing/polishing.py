@@ -19,8 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..adaptivity import END_POWER, RefinementTree, corners
-from ..arrays import Array, Mask, by_field
+from ..adaptivity import END_POWER, corners
+from ..arrays import Array, Mask
 from ..contact import by_line
 from ..discrete import discretise, minimise_energy
 from ..errors import ContactError, ConvergenceError, warn
@@ -34,8 +34,8 @@ from ..fem import (
 from ..lagrange import gauss, lagrange
 from ..mesh import cad_edges, check_curves, resolved_lengths
 from ..problem import MeshArrays, Problem
-from ..solution import Solution
-from ..solved import Solved, made_of
+from ..solution import Solution, solution_of
+from ..solved import Solved
 from .geometric_mesh import (
     CORNER_RATIO,
     END_RATIO,
@@ -173,9 +173,7 @@ def _polished(solution: Solution, digits: int) -> Solution:
         raise ContactError(wrong)
     if (reached := round(-math.log10(error))) < digits:
         warn(f"polish: order {order} has about {reached} digits, not {digits}")
-    return Solution(
-        **by_field(polished), tree=RefinementTree(polished.mesh, np.arange(polished.mesh.ne))
-    )
+    return polished
 
 
 def _quantities(solution: Solved) -> Array:
@@ -257,7 +255,7 @@ def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh
     return regular
 
 
-def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved:
+def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solution:
     """The solution with contact on the closed segments of a mesh, of degree `order`."""
     curved = mesh.mesh(order)
     check_curves(curved)
@@ -272,7 +270,7 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
     if not np.array_equal(minimiser.active, zone):
         raise ConvergenceError("contact alone cannot hold a body", iterate=minimiser)
     bent = int(np.count_nonzero(discrete.space.trace.curved_segments))
-    return made_of(Solved, minimiser, [discrete], ELEMENT, bent)
+    return solution_of(minimiser, [discrete], ELEMENT, bent)
 
 
 def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
