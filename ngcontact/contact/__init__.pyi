@@ -19,8 +19,6 @@ from .facing import rays as rays
 from .line import ContactLine as ContactLine
 from .line import by_line as by_line
 from .line import in_contact as in_contact
-from .line import neighbours as neighbours
-from .line import twins as twins
 from .line import without as without
 from .nodal import jacobian as jacobian
 from .nodal import nodal_line as nodal_line

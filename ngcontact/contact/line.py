@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import Any, ClassVar, TypeVar
 
@@ -50,6 +51,21 @@ class ContactLine:
     def dim(self) -> int:
         """Dimension of the bodies."""
         return int(self.position.shape[1])
+
+    @cached_property
+    def neighbours(self) -> Index:
+        """Pairs (l, 2) of contact points along a plane line, over nodes without one; `twins`."""
+        segment, place = np.nonzero(self.rows >= 0)
+        point, same = self.rows[segment, place], segment[1:] == segment[:-1]
+        return np.concatenate([np.column_stack([point[:-1], point[1:]])[same], self.twins])
+
+    @cached_property
+    def twins(self) -> Index:
+        """Pairs (t, 2) of contact points that share a node, a corner."""
+        order = np.argsort(self.node, kind="stable")
+        node = self.node[order]
+        same = np.flatnonzero(node[1:] == node[:-1])
+        return np.column_stack([order[same], order[same + 1]])
 
     def on_segments(self, values: NDArray[Any], missing: Any) -> NDArray[Any]:
         """Values (k, q) at nodes, of `values` (m,), of vectors (k, q, d); `missing` without."""
@@ -111,21 +127,6 @@ def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
     return [values[first:last] for first, last in pairwise(stops)]
 
 
-def neighbours(line: ContactLine) -> Index:
-    """Pairs (l, 2) of contact points along a plane line, over nodes without one, and of corners."""
-    segment, place = np.nonzero(line.rows >= 0)
-    point, same = line.rows[segment, place], segment[1:] == segment[:-1]
-    return np.concatenate([np.column_stack([point[:-1], point[1:]])[same], twins(line)])
-
-
-def twins(line: ContactLine) -> Index:
-    """Pairs (t, 2) of contact points that share a node."""
-    order = np.argsort(line.node, kind="stable")
-    node = line.node[order]
-    same = np.flatnonzero(node[1:] == node[:-1])
-    return np.column_stack([order[same], order[same + 1]])
-
-
 def in_contact(line: ContactLine, active: Mask) -> Mask:
     """Points in contact (m,): the `active` (m,) and open ones at corners inside the contact.
 
@@ -133,7 +134,7 @@ def in_contact(line: ContactLine, active: Mask) -> Mask:
     of the two rows is released where the node would rather slide off the corner.
     """
     state = active.copy()
-    corners = twins(line)
+    corners = line.twins
     for i in corners[active[corners].sum(axis=1) == 1].ravel():
         if not active[i]:
             first, last = line.rows[:, :-1], line.rows[:, 1:]

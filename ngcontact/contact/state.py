@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask, distances_along
 from ..fem import ORDERS, Model
-from .line import ContactLine, in_contact, neighbours
+from .line import ContactLine, in_contact
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -76,7 +76,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     points in contact are `active` (m,).
     """
     beside: dict[int, list[int]] = defaultdict(list)
-    linked = neighbours(line)
+    linked = line.neighbours
     for a, b in linked.tolist():
         beside[a].append(b)
         beside[b].append(a)

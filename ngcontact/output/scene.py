@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..arrays import Array, Index, Mask, across, distances_along, paths
-from ..contact import neighbours
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
@@ -181,7 +180,7 @@ def contact_lines(solution: Solved) -> list[ContactPath]:
             eta = line.position @ (_rising(axis) * axis)
             order = np.argsort(eta, kind="stable")
             lines.append(ContactPath(pair, rows[order], eta[order]))
-        for path in paths(neighbours(line), len(rows)) if direction is None and len(rows) else ():
+        for path in paths(line.neighbours, len(rows)) if direction is None and len(rows) else ():
             path = path[:-1] if len(path) > 1 and path[0] == path[-1] else path
             path = path[:: int(_rising(np.diff(line.position[path[[0, -1]]], axis=0)[0]))]
             s = start + distances_along(line.position[path])

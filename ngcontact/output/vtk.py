@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Index
-from ..contact import neighbours
 from ..estimator import Estimated
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
@@ -207,7 +206,7 @@ def _contact(solution: Solved) -> pyvista.PolyData:
                 fields[name] = np.concatenate([known, own.get(name, none)[others]])
         else:
             rows = np.flatnonzero(solution.pair == pair)
-            cells.append(rows[neighbours(solution.pairs[pair].line)])
+            cells.append(rows[solution.pairs[pair].line.neighbours])
     if m:
         joined = {"faces" if solid else "lines": sized(np.concatenate(cells))}
         data = pyvista.PolyData(in_space(points), verts=sized(np.arange(m)[:, None]), **joined)

@@ -28,11 +28,9 @@ from ..contact import (
     facing_pieces,
     in_contact,
     interpolated_rays,
-    neighbours,
     opposite,
     partners,
     prescribed_gap,
-    twins,
 )
 from ..fem import BoundaryTrace, FacetTrace
 from ..reference import triangle
@@ -179,11 +177,10 @@ def _labels(linked: Index, count: int) -> Index:
 
 def zones_of(state: ContactState) -> ContactZones:
     """The zones of one pair: points in contact are linked along the line, of solids by facets."""
-    line, m, corners = state.line, len(state.gap), twins(state.line)
+    line, m, corners = state.line, len(state.gap), state.line.twins
     closed, parts = state.active, line.rows
     if line.dim == 2:
-        closed = in_contact(line, closed) if len(corners) else closed
-        parts = neighbours(line)
+        closed, parts = in_contact(line, closed), line.neighbours
     met, opened = ((parts >= 0) & x[parts] for x in (closed, ~closed))
     first = parts[np.arange(len(parts)), met.argmax(axis=1)]
     label = _labels(np.array([(first[:, None] + 0 * parts)[met], parts[met]]).T, m)
@@ -418,7 +415,7 @@ def drawn_gap_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, f
     Means weighted by force; 0 where normals do not turn or the bodies are drawn touching. Errors up
     to `PEAK_ERROR` are upper bounds.
     """
-    line, force, along = state.line, np.abs(state.force), neighbours(state.line)
+    line, force, along = state.line, np.abs(state.force), state.line.neighbours
     along = along[np.diff(line.node[along], axis=1)[:, 0] != 0]
     weight = force[along].sum(axis=1)
     if not weight.any():

@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, chords
-from ..contact import ContactState, by_line, contact_line, faced_vertices, twins
+from ..contact import ContactState, by_line, contact_line, faced_vertices
 from ..discrete import carried_active_set
 from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
@@ -193,7 +193,7 @@ class GeometricMesh:
 
 def isolated(state: ContactState) -> Mask:
     """Ends (k,) of contact of a pair that are not at corners of its line."""
-    return ~np.isin(state.transitions.inner, twins(state.line))
+    return ~np.isin(state.transitions.inner, state.line.twins)
 
 
 def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) -> GeometricMesh:
