@@ -29,7 +29,6 @@ from ..contact import (
     in_contact,
     interpolated_rays,
     opposite,
-    partners,
     prescribed_gap,
 )
 from ..fem import BoundaryTrace, FacetTrace
@@ -61,9 +60,9 @@ MISSING_PRESSURE = 0.25
 # exceed it by orders of magnitude. The mean is taken as the peak at the corners of a punch is
 # infinite, and this modulus as nearly incompressible bodies bear pressures far above E.
 LARGE_PRESSURE = 1.0
-# Parameters on a segment at which penetration is sampled; between two of them a curve departs from
-# its chord by 1 / 16 of what it does on the segment.
-PLACES = (np.arange(4) + 0.5) / 4
+# Places on a part at which penetration is sampled: between two of them a curve departs from its
+# chord by 1 / 16 of what it does on the part. Of triangles the corners and the centre.
+PLACES = {2: (np.arange(4) + 0.5) / 4, 3: np.vstack([np.eye(3), triangle.CENTRE])}
 MOST_SEGMENTS = 32  # segments of a pair that are sampled for penetration, those of least gap
 LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
 # Angle to the direction, from which forces along it are wrong by 1 - cos = 3.4 %.
@@ -255,39 +254,27 @@ class _Samples:
     distance: Array  # (k,), drawn, along the direction; infinite where nothing faces
 
 
-def _samples_of_lines(trace: BoundaryTrace, state: ContactState) -> _Samples:
-    """Samples on segments of the plane with an open point, of small gaps that change much."""
-    line, gap, contact = state.line, np.maximum(state.gap, 0.0), state.line.contact
-    whole = np.flatnonzero((line.rows >= 0).all(axis=1))
-    rows, high = line.rows[whole], np.zeros(len(gap))
-    np.maximum.at(high, rows, np.broadcast_to(gap[rows].max(axis=1)[:, None], rows.shape))
-    least, most = gap[rows].min(axis=1), high[rows].max(axis=1)
-    near = np.flatnonzero((2 * least < most) & ~state.active[rows].all(axis=1))
-    local = whole[near[np.argsort(least[near], kind="stable")[:MOST_SEGMENTS]]]
-    segment, s = trace.at_places(line.segments[local], PLACES)
-    x, d = trace.point(segment, s), trace.normal(segment, s)
-    if contact.direction is not None:
-        d = np.tile(contact.direction, (len(s), 1))
-    there = partners(trace, line.facing, segment, x, d, nodes=False)
-    return _Samples(segment, s, x, d, there.segment, there.s, there.distance)
-
-
-def _samples_of_surfaces(trace: BoundaryTrace, state: ContactState) -> _Samples:
-    """Samples on facets of solids: corners and centres of facing parts, where a point is open."""
-    zone = state.line
-    assert isinstance(trace, FacetTrace)  # of solids
-    parts, _ = facing_pieces(trace, zone, np.asarray((zone.rows >= 0).any(axis=1)))
-    places = np.vstack([trace.vertices, triangle.CENTRE])
-    each = rows_of(parts, np.arange(len(parts.local)).repeat(len(places)))
-    opened = np.asarray(zone.on_segments(~state.active, False).any(axis=1))
-    some = np.flatnonzero(opened[each.local])
-    each, s = rows_of(each, some), parts.places(places)[some]
-    x = trace.point(zone.segments[each.local], s)
-    d = interpolated_rays(trace, zone.contact, zone.segments, each.local, s)
+def _samples(trace: BoundaryTrace, state: ContactState) -> _Samples:
+    """Samples of facing parts where a point is open; on lines of small gaps that change much."""
+    line, contact, gap = state.line, state.line.contact, np.maximum(state.gap, 0.0)
+    some = np.asarray(line.on_segments(~state.active, False).any(axis=1))
+    if line.dim == 2:
+        whole = np.flatnonzero(some & (line.rows >= 0).all(axis=1))
+        rows, high = line.rows[whole], gap.copy()
+        np.maximum.at(high, rows, gap[rows].max(axis=1, keepdims=True))
+        least, most = gap[rows].min(axis=1), high[rows].max(axis=1)
+        near = np.flatnonzero(2 * least < most)
+        some = np.zeros(len(line.rows), dtype=bool)
+        some[whole[near[np.argsort(least[near], kind="stable")[:MOST_SEGMENTS]]]] = True
+    parts, _ = facing_pieces(trace, line, some)
+    places = PLACES[line.dim]
+    each, s = rows_of(parts, np.arange(len(parts.local)).repeat(len(places))), parts.places(places)
+    segment = line.segments[each.local]
+    x, d = trace.point(segment, s), interpolated_rays(trace, contact, line.segments, each.local, s)
     there, distance = each.opposite, np.zeros(len(x))
-    if zone.contact.primary is not None:
+    if contact.primary is not None:
         there, distance = opposite(trace, x, d, each.facing, there)
-    return _Samples(zone.segments[each.local], s, x, d, each.facing, there, distance)
+    return _Samples(segment, s, x, d, each.facing, there, distance)
 
 
 def _left(solution: Solved, state: ContactState, seen: _Samples) -> tuple[_Samples, Array, float]:
@@ -342,8 +329,7 @@ def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
     trace = solution.discrete.space.trace
     if state.line.contact.bilateral or state.active.all():
         return ""
-    sample = _samples_of_lines if trace.mesh.dim == 2 else _samples_of_surfaces
-    seen, left, noise = _left(solution, state, sample(trace, state))
+    seen, left, noise = _left(solution, state, _samples(trace, state))
     if not left.size:
         return ""
     deepest = int(np.argmin(left))
