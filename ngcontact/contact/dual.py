@@ -46,7 +46,7 @@ from .facing import (
     opposite_segments,
     rays,
 )
-from .line import ContactLine, without
+from .line import ContactLine, with_points
 from .nodal import jacobian, nodal_line, prescribed_gap, segment_weights, with_roles
 from .projection import MATCHING_DISTANCE
 
@@ -371,9 +371,8 @@ def lines_together(trace: BoundaryTrace, contacts: Sequence[Contact]) -> list[Co
     for contact in contacts:
         own = trace.lies_on(line.segments, contact.secondary)
         part = replace(rows_of(line, own, *ContactLine.by_segment), contact=contact)
-        others = np.ones(len(carries) + 1, dtype=bool)
-        others[part.rows] = False
-        found.append(_carrying(without(part, np.flatnonzero(others[:-1])), carries[~others[:-1]]))
+        points = np.isin(np.arange(len(carries)), part.rows)
+        found.append(_carrying(with_points(part, points), carries[points]))
     return found
 
 
@@ -398,7 +397,7 @@ def _carrying(line: ContactLine, carries: Mask) -> ContactLine:
             "choose boundaries that look at each other; the direction points from the secondary "
             "body to the primary one"
         )
-    return without(line, np.flatnonzero(~carries))
+    return with_points(line, carries)
 
 
 def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> BoundaryTrace:

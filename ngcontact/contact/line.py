@@ -143,15 +143,11 @@ def in_contact(line: ContactLine, active: Mask) -> Mask:
     return state
 
 
-def without(line: ContactLine, dropped: Index) -> ContactLine:
-    """The line without its points `dropped` (j,); the segments still face the primary."""
-    if dropped.size == 0:
+def with_points(line: ContactLine, keep: Mask) -> ContactLine:
+    """The line with its points `keep` (m,) alone; the segments still face the primary."""
+    if keep.all():
         return line
-    m = len(line.node)
-    keep = np.ones(m, dtype=bool)
-    keep[dropped] = False
-    renumber = np.full(m + 1, -1)
-    renumber[:-1][keep] = np.arange(np.count_nonzero(keep))
+    renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
     names = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
     kept = rows_of(line, keep, *names, "coupling", "on_axis", "means")
     return replace(kept, rows=renumber[line.rows])
