@@ -329,11 +329,8 @@ def change_of_basis(
 
     The `length` is the largest coordinate, to whose round-off the gaps are known; `stiffness` (n,)
     the force per displacement at the nodes, by its order of magnitude, alike when left out.
-
-    Raises
-    ------
-    ValueError
-        Prescribed displacements on both sides violate a row, or rows depend on each other.
+    Prescribed displacements on both sides that violate a row, and rows that depend on each other,
+    are refused.
     """
     (m, n), d = rows.coupling.shape, rows.direction.shape[1]
     supported = _supported(conditions, rows)

@@ -237,13 +237,7 @@ def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array
 
 
 def state_of(states: Sequence[ContactState], pair: int) -> ContactState:
-    """The state of one pair, by its number.
-
-    Raises
-    ------
-    TypeError, ValueError
-        `pair` numbers none of them.
-    """
+    """The state of one `pair`, by its number; what numbers none of them is refused."""
     count = len(states)
     right = f"the pairs are numbered from 0 to {count - 1}" if count else "there is no contact"
     if isinstance(pair, bool) or not isinstance(pair, int | np.integer):

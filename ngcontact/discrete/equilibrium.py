@@ -270,13 +270,8 @@ def equilibrium(
     """The rigid motions that supports leave free, and the load (d * N,) in equilibrium on them.
 
     None, and the load as it is, if supports alone hold all bodies. `around` sums values of rows
-    over those on their segments.
-
-    Raises
-    ------
-    NoEquilibriumError
-        The load does work on a rigid motion that supports and contact admit, or needs contact
-        forces at single points.
+    over those on their segments. A load that does work on a rigid motion which supports and contact
+    admit, or needs contact forces at single points, is a `NoEquilibriumError`.
     """
     found = free_motions(space, conditions, model_of(problem).motions)
     if found is None:

@@ -142,12 +142,8 @@ class Multigrid:
     def solve(self, right: Array, target: float, most: int) -> tuple[Array, int]:
         """Solution (n,), its largest residual at most `target`, and the number of V-cycles.
 
-        Of `right` (n,), which is read where unknowns are free; `most` V-cycles are allowed.
-
-        Raises
-        ------
-        StalledError
-            The target was not reached in `most` V-cycles, or will not be at the rate so far.
+        Of `right` (n,), which is read where unknowns are free. A target that is not reached in
+        `most` V-cycles, or will not be at the rate so far, is a `StalledError`.
         """
         finest = self.levels[0]
         x, r, z, d, q = (finest.matrix.CreateColVector() for _ in range(5))

@@ -129,12 +129,8 @@ class BorderedSystems:
     def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
         """Minimiser (n,) and multipliers (m,) with the rows `active` (m,) held at their bounds.
 
-        The residual is 1e-11 of the first one; `refine` takes it to round-off.
-
-        Raises
-        ------
-        SingularError
-            The matrix is singular to working precision.
+        The residual is 1e-11 of the first one; `refine` takes it to round-off. A matrix that is
+        singular to working precision is a `SingularError`.
         """
         self._improve(self._reach(active, anchor), COARSE_RESIDUAL)
         return self.y.copy(), self.force.copy()
