@@ -9,22 +9,22 @@ import pytest
 
 from drivers.reference import axisymmetric_cases as cases_about_an_axis
 from ngcontact import solve
-from ngcontact.contact.line import in_contact
-from ngcontact.contact.state import (
-    ContactState,
-    continued_to_axis,
-    transitions_on,
-)
+from ngcontact.contact.line import ContactLine, in_contact
+from ngcontact.contact.state import ContactState, continued_to_axis, transitions_on
 from ngcontact.fem import MODELS
+
+
+class Points(SimpleNamespace):
+    """The points of a contact line, and what these alone tell."""
+
+    neighbours, twins = ContactLine.neighbours, ContactLine.twins
 
 
 def line(x, order=1, y=None):
     """Contact points on a polygon through (x, y), `order` + 1 of them on each segment."""
     position = np.column_stack([x, np.zeros(len(x)) if y is None else y])
     first = np.arange(0, len(x) - 1, order)[:, None]
-    return SimpleNamespace(
-        position=position, rows=first + np.arange(order + 1), node=np.arange(len(x))
-    )
+    return Points(position=position, rows=first + np.arange(order + 1), node=np.arange(len(x)))
 
 
 def opening(distance):
@@ -88,7 +88,7 @@ def test_the_end_of_an_unresolved_zone_is_told_by_its_force(order, zone):
 def test_a_closed_line_has_no_first_point():
     count, end = 60, 0.733
     angle = np.linspace(0, 2 * math.pi, count, endpoint=False)
-    ring = SimpleNamespace(
+    ring = Points(
         position=np.column_stack([np.cos(angle), np.sin(angle)]),
         rows=np.column_stack([np.arange(count), np.roll(np.arange(count), -1)]),
         node=np.arange(count),
@@ -108,7 +108,7 @@ def at_a_corner(x, corner, order=1):
     rows = np.arange(0, len(x) - 1, order)[:, None] + np.arange(order + 1)
     rows[rows[:, 0] == corner, 0] = len(x)
     position = np.column_stack([x, -0.3 * np.maximum(x - x[corner], 0)])[nodes]
-    return SimpleNamespace(position=position, rows=rows, node=nodes)
+    return Points(position=position, rows=rows, node=nodes)
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -137,7 +137,7 @@ def test_no_end_at_a_corner_inside_the_contact():
 
 
 # Two segments that meet at node 1, where the points 1 and 2 are.
-BENT = SimpleNamespace(node=np.array([0, 1, 1, 2]), rows=np.array([[0, 1], [2, 3]]))
+BENT = Points(node=np.array([0, 1, 1, 2]), rows=np.array([[0, 1], [2, 3]]))
 
 
 def mask(text):
