@@ -190,7 +190,7 @@ def _alone(
     """
     groups: dict[Any, list[int]] = defaultdict(list)
     for number, contact in enumerate(contacts):
-        if contact.roles == "given":
+        if contact.roles == "given" and not callable(contact.gap):
             groups[contact.primary, alike(contact)].append(number)
 
     def alone(group: list[int]) -> bool:

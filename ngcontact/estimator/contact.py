@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from ..arrays import Array, Index, Mask, across, chords, joined, rows_of
 from ..contact import (
@@ -25,6 +26,7 @@ from ..contact import (
 )
 from ..fem import BoundaryTrace
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
+from ..problem import Contact
 from ..reference import triangle
 from .terms import (
     DATA_BONUS,
@@ -48,25 +50,22 @@ GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is mea
 BUMP_FACTOR = 2.0
 
 
-def covered_parts(
-    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, whole: int
-) -> Parts:
-    """Parts of both bodies that face each other, two a piece; the first `whole` are segments."""
-    segment = line.segments[pieces.local]
-    own = Parts(segment, pieces.start, pieces.stop)
-    if line.contact.primary is None:
+def covered_parts(boundary: BoundaryTrace, zone: Zone, pieces: FacingPieces, whole: Mask) -> Parts:
+    """Parts of both bodies that face each other, two a piece; of the `whole` (r,) all of both."""
+    own = Parts(zone.segments[pieces.local], pieces.start, pieces.stop)
+    if zone.contact.primary is None:
         return own
-    low, high = np.zeros(len(segment)), np.ones(len(segment))
-    if whole < len(segment):
-        rest = rows_of(pieces, np.arange(whole, len(segment)))
+    low, high = np.zeros(len(whole)), np.ones(len(whole))
+    if not whole.all():
+        rest = rows_of(pieces, ~whole)
         s = np.concatenate([rest.start, rest.stop])
         twice = joined([rest, rest])
-        d, _ = directions(boundary, line, twice.local, s)
-        x = boundary.point(line.segments[twice.local], s)
+        d, _ = zone.directions(twice.local, s)
+        x = boundary.point(zone.segments[twice.local], s)
         t, _ = opposite(boundary, x, d, twice.facing, twice.opposite, NEWTON_TOLERANCE)
         inside = (s > 0) & (s < 1)  # where a vertex of the primary is passed
         ends = np.where(inside, np.round(t), t).reshape(2, -1)
-        low[whole:], high[whole:] = np.sort(ends, axis=0)
+        low[~whole], high[~whole] = np.sort(ends, axis=0)
     return joined([own, Parts(pieces.facing, low, high)])
 
 
@@ -86,29 +85,26 @@ def remaining(inner: Mask, covered: list[Parts]) -> Parts:
 
 
 def as_fine_as_gap(
-    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces
+    boundary: BoundaryTrace, contact: Contact, segments: Index, pieces: FacingPieces
 ) -> FacingPieces:
-    """Parts of the pieces, as of `fine_parts`, where the gap is a function."""
-    if line.contact.gap is None or isinstance(line.contact.gap, float):
+    """Parts of the pieces of `segments` (k,), as of `fine_parts`, where the gap is a function."""
+    if contact.gap is None or isinstance(contact.gap, float):
         return pieces
-    size = boundary.lengths(line.segments)[pieces.local] * pieces.share
+    size = boundary.lengths(segments)[pieces.local] * pieces.share
     number, start, length = fine_parts(size, np.ones(len(size), dtype=bool))
     pieces = rows_of(pieces, number)
     start, share = pieces.start + pieces.share * start, pieces.share * length
     return replace(pieces, corners=np.stack([start, start + share], axis=1), share=share)
 
 
-def directions(
-    boundary: BoundaryTrace, line: ContactLine, local: Index, s: Array
-) -> tuple[Array, Array]:
-    """Unit directions d of contact (k, 2), and their derivatives (k, 2) with respect to s.
+def nodal_directions(boundary: BoundaryTrace, line: ContactLine) -> Array:
+    """Unit directions d of contact (k, order + 1, 2) at the nodes of a line's segments.
 
-    At `s` (k,) of the line's segments of the numbers `local` (k,). On a bounded zone those of the
-    rows at the nodes, interpolated: exact on circles, on other curves to the degree plus one.
+    On a bounded zone those of the rows, whose interpolation is exact on circles, on other curves to
+    the degree plus one.
     """
     if line.contact.direction is not None:
-        d = np.full((len(s), 2), line.contact.direction)
-        return d, np.zeros_like(d)
+        return np.full((*line.rows.shape, 2), line.contact.direction)
     nodal = line.on_segments(line.direction, 0.0)
     # At ends of Gamma_K on Gamma_u and on parts that do not face there are no rows. At an axis
     # nodes are those of a rule with the weight r.
@@ -117,7 +113,7 @@ def directions(
         segment, at_node = boundary.at_places(line.segments, gauss_lobatto(boundary.order))
         here = without.ravel()
         nodal[without] = boundary.exact_normal(segment[here], at_node[here])
-    return between_nodes(nodal[local], s)
+    return nodal
 
 
 def between_nodes(nodal: Array, s: Array) -> tuple[Array, Array]:
@@ -131,12 +127,44 @@ def between_nodes(nodal: Array, s: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class FacingPoints:
-    """Points of quadrature on the parts of a contact line that face the primary, k of them."""
+class Zone:
+    """The k segments of the secondaries of pairs of one kind, one pair after the other."""
 
-    local: Index  # (k,), rows of `line.rows`
+    contact: Contact  # one of them: others differ in their boundaries and directions alone
+    lines: list[ContactLine]
+    segments: Index  # (k,)
+    nodal: Array  # (k, order + 1, 2), directions of contact at the nodes
+    pressure: Array  # (k, order + 1), pi_h at the nodes, NaN where no pair has a point
+    active: Mask  # (k, order + 1), nodes in contact, and those where no pair has a point
+
+    def directions(self, number: Index, s: Array) -> tuple[Array, Array]:
+        """Unit directions d (j, 2) at `s` (j,) of the segments `number` (j,), their d/ds (j, 2)."""
+        if self.contact.direction is not None:
+            return self.nodal[number, 0], np.zeros((len(s), 2))
+        return between_nodes(self.nodal[number], s)
+
+    def pieces(self, boundary: BoundaryTrace) -> tuple[FacingPieces, Mask, FacingPieces]:
+        """Parts that face the primary, whether (r,) they are whole segments, and as gaps ask."""
+        found, last = [], 0
+        for line in self.lines:
+            first, last = last, last + len(line.segments)
+            carrying = np.isfinite(self.pressure[first:last]).any(axis=1)  # points, of any pair
+            carrying &= self.contact.primary is not None
+            parts, count = facing_pieces(boundary, line, np.asarray(line.faces | carrying))
+            parts = replace(parts, local=first + parts.local)
+            fine = as_fine_as_gap(boundary, self.contact, self.segments, parts)
+            found.append((parts, np.arange(len(parts.local)) < count, fine))
+        every, whole, finer = zip(*found, strict=True)
+        return joined(every), np.concatenate(whole), joined(finer)
+
+
+@dataclass(frozen=True, eq=False)
+class FacingPoints:
+    """Points of quadrature on the parts of a zone that face the primary, k of them."""
+
+    number: Index  # (k,), of their segments in the zone
     own: BoundaryPoints  # weights in arc length of the secondary (P1) or in eta (P2)
-    facing: BoundaryPoints  # on the primary; segments are -1 for a rigid obstacle
+    facing: BoundaryPoints | None  # on the primary; none of a rigid obstacle
     direction: Array  # (k, 2), d
     distance: Array  # (k,), eps along d before deformation, a length
     # (2, k), arc length on the secondary and on the primary, per arc length of the secondary (P1)
@@ -145,36 +173,33 @@ class FacingPoints:
 
 
 def facing_points(
-    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, order: int
+    boundary: BoundaryTrace, zone: Zone, pieces: FacingPieces, order: int
 ) -> FacingPoints:
-    """Gauss points of degree `order` on the pieces of a line, and what is opposite to them."""
-    parts = Parts(line.segments[pieces.local], pieces.start, pieces.stop)
-    part, (segment, s, weight) = parts.points(order)
-    local, facing = pieces.local[part], pieces.facing[part]
-    d, turning_rate = directions(boundary, line, local, s)
-    x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
-    length = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s)
-    # Where the direction is tangent to a curve d eta is 0.
-    speed = np.maximum(jacobian(boundary, line.contact, segment, s), FACING_COSINE * length)
-    weight, stretch = weight * speed, np.ones((2, len(s)))
-    stretch[0] = length / speed
-    if line.contact.primary is None:
-        s_there, distance = np.zeros(len(s)), np.zeros(len(s))
-    else:
-        near = pieces.opposite[part]
-        s_there, distance = opposite(boundary, x, d, facing, near, NEWTON_TOLERANCE)
-        distance[np.abs(distance) <= GAP_ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
+    """Gauss points of degree `order` on the pieces of a zone, and what is opposite to them."""
+    parts = Parts(zone.segments[pieces.local], pieces.start, pieces.stop)
+    part, own = parts.points(boundary, order)
+    number, model, facing = pieces.local[part], boundary.model, None
+    d, turning_rate = zone.directions(number, own.s)
+    length = own.lengths(model)
+    # Per eta along a fixed direction; where that is tangent to a curve d eta is 0.
+    cosine = (own.normal * d).sum(axis=1) if zone.contact.direction is not None else np.ones(1)
+    speed = length * np.maximum(np.abs(cosine), FACING_COSINE)
+    own = replace(own, weight=own.weight * speed)
+    stretch, distance = np.stack([length / speed, np.ones(len(speed))]), np.zeros(len(speed))
+    if zone.contact.primary is not None:
+        there, near = pieces.facing[part], pieces.opposite[part]
+        s, distance = opposite(boundary, own.position, d, there, near, NEWTON_TOLERANCE)
+        noise = GAP_ROUND_OFF * np.abs(own.position).max(initial=0.0)
+        distance[np.abs(distance) <= noise] = 0.0
+        facing = BoundaryPoints.at(boundary, there, s, own.weight)
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
-        there = boundary.derivative(facing, s_there)
-        turning, size = np.abs((there * across(d)).sum(axis=1)), np.linalg.norm(there, axis=1)
-        turning = np.maximum(turning, FACING_COSINE * size)
-        rate = (slope * across(d)).sum(axis=1) - distance * (d * across(turning_rate)).sum(axis=1)
-        length = size * boundary.measure(facing, s_there)
-        stretch[1] = np.abs(rate) / turning * length / speed
-    if line.contact.gap is not None:
-        distance = prescribed_gap(line.contact, boundary, segment, s, x)
-    own, other = BoundaryPoints(segment, s, weight), BoundaryPoints(facing, s_there, weight)
-    return FacingPoints(local, own, other, d, distance, stretch)
+        turning = np.abs((facing.slope * across(d)).sum(axis=1))
+        turning = np.maximum(turning, FACING_COSINE * np.linalg.norm(facing.slope, axis=1))
+        rate = (own.slope * across(d) - distance[:, None] * d * across(turning_rate)).sum(axis=1)
+        stretch[1] = np.abs(rate) / turning * facing.lengths(model) / speed
+    if zone.contact.gap is not None:
+        distance = prescribed_gap(zone.contact, boundary, own.segment, own.s, own.position)
+    return FacingPoints(number, own, facing, d, distance, stretch)
 
 
 def closing_energy(
@@ -183,6 +208,7 @@ def closing_energy(
     stiffness: Array,
     w: Array,
     *,
+    number: Index | None = None,
     or_more: bool = False,
 ) -> Array:
     """Energy (k,) of a displacement `w` (k,) of the boundary, without a unit: c |w|^2 h / l.
@@ -190,70 +216,85 @@ def closing_energy(
     The `stiffness` (k,) is c, a modulus over h; l is the element's diameter h, or where it is
     shorter the length |w| / |d_s w| in which w changes on the segment: |w| |d_s w| bounds the
     square of w in H^(1/2). Of a w that jumps it is infinite; where more than w does as well
-    (`or_more`) it is at most that of a bump as high as w.
+    (`or_more`) it is at most that of a bump as high as w. A `number` (k,) tells segments apart that
+    occur twice.
     """
-    segment, s, weight = points
-    boundary = solution.boundary
-    same = segment[1:] == segment[:-1]
-    change = np.diff(w) ** 2 * same
+    number, start = points.segment if number is None else number, np.ones(len(w), dtype=bool)
+    start[1:] = number[1:] != number[:-1]
+    change, apart = np.zeros((2, len(w)))  # from the point before on a segment
+    change[1:] = np.diff(w) ** 2
+    change[start] = 0.0
     if not change.any():
         return stiffness * w**2
-    size, position = len(boundary.region), boundary.point(segment, s)
-    measure = solution.model.measure(position)
-    apart = chords(position)
+    apart[1:] = chords(points.position)
+    apart[start] = 0.0
+    measure, first = solution.model.measure(points.position), np.flatnonzero(start)
     # Points coincide to round-off at a jump.
-    steep = np.divide(change, apart, out=np.zeros_like(change), where=apart > 0) * measure[1:]
-    square = np.bincount(segment, weight * w**2, size)
-    rise, seen = (np.bincount(segment[1:], x, size) for x in (steep, apart * same))
-    whole = boundary.lengths(np.arange(size))
-    sloping = rise * whole / np.where(seen > 0, seen, np.inf)
-    h = solution.diameter[boundary.element]
-
-    def over_square(values: Array) -> Array:
-        return np.divide(values, square, out=np.zeros(size), where=square > 0)
-
-    times = h * np.sqrt(over_square(sloping))
+    steep = change / np.where(apart > 0, apart, np.inf) * measure
+    sums = np.add.reduceat([steep, apart, points.weight * w**2], first, axis=1)
+    rise, seen, square = np.where(sums > 0, sums, [[0.0], [np.inf], [np.inf]])
+    segment = points.segment[first]
+    h = solution.diameter[solution.boundary.element[segment]]
+    times = h * np.sqrt(rise * solution.boundary.lengths(segment) / seen / square)
     if or_more:
-        largest = np.zeros(size)
-        np.maximum.at(largest, segment, measure * w**2)
-        times = np.minimum(times, BUMP_FACTOR * h * over_square(largest))
-    return stiffness * w**2 * np.maximum(times, 1)[segment]
+        largest = np.maximum.reduceat(measure * w**2, first)
+        times = np.minimum(times, BUMP_FACTOR * h * largest / square)
+    return stiffness * w**2 * np.maximum(times, 1)[np.cumsum(start) - 1]
 
 
 def on_contact(
-    solution: ScaledSolution, pair: ContactState, pairs: Sequence[ContactState]
-) -> tuple[BoundaryTerms, Parts]:
-    """Terms on both sides of one pair of all `pairs`, and the parts of the boundary they cover."""
-    boundary, line = solution.boundary, pair.line
-    nodal, active = at_nodes(boundary, pair, pairs)
-    known = np.isfinite(nodal)
-    carrying = known.any(axis=1) & (line.contact.primary is not None)  # points, of any pair
-    pieces, whole = facing_pieces(boundary, line, np.asarray(line.faces | carrying))
+    solution: ScaledSolution, pairs: Sequence[ContactState]
+) -> tuple[BoundaryTerms, list[Parts]]:
+    """Terms on both sides of all `pairs`, and the parts of the boundary that they cover."""
+    boundary, kinds = solution.boundary, defaultdict[Any, list[ContactState]](list)
+    for pair in pairs:
+        c = pair.line.contact
+        gap = id(c.gap) if callable(c.gap) else c.gap
+        kinds[c.primary is None, c.direction is None, c.bilateral, gap].append(pair)
+    terms, covered = BoundaryTerms(), list[Parts]()
+    for group in kinds.values():
+        lines = [pair.line for pair in group]
+        of_lines = [
+            (line.segments, nodal_directions(boundary, line), *at_nodes(boundary, pair, pairs))
+            for pair, line in zip(group, lines, strict=True)
+        ]
+        arrays = map(np.concatenate, zip(*of_lines, strict=True))
+        on_zone, parts = _on_zone(solution, Zone(lines[0].contact, lines, *arrays))
+        terms += on_zone
+        covered.append(parts)
+    return terms, covered
+
+
+def _on_zone(solution: ScaledSolution, zone: Zone) -> tuple[BoundaryTerms, Parts]:
+    """Terms on both sides of a zone, and the parts of the boundary that it covers."""
+    boundary, contact = solution.boundary, zone.contact
+    pieces, whole, fine = zone.pieces(boundary)
     # Without contact a boundary is free, and may face several others.
-    closed = (known & (active | (nodal != 0))).any(axis=1)
+    known = np.isfinite(zone.pressure)
+    closed = (known & (zone.active | (zone.pressure != 0))).any(axis=1)
     held = closed[pieces.local]
-    covered = covered_parts(boundary, line, rows_of(pieces, held), int(held[:whole].sum()))
+    covered = covered_parts(boundary, zone, rows_of(pieces, held), whole[held])
     if len(pieces.local) == 0:
         return [], covered
-    order, fine = 2 * solution.order + DATA_BONUS, as_fine_as_gap(boundary, line, pieces)
-    points = facing_points(boundary, line, fine, order)
-    nodal = _pressure_on_segments(nodal, boundary.places(line.segments))
-    pressure = (boundary.shapes(*points.own[:2]) * nodal[points.local]).sum(axis=1) / solution.unit
-    full = np.asarray(active.all(axis=1))[points.local]
-    meets = closed[points.local]
-    sides = [_side(solution, points, pressure, meets, own=True)]
-    if line.contact.primary is not None:
-        sides.append(_side(solution, points, -pressure, meets, own=False))
+    points = facing_points(boundary, zone, fine, 2 * solution.order + DATA_BONUS)
+    own, number = points.own, points.number
+    nodal = _pressure_on_segments(zone.pressure, boundary.places(zone.segments))
+    pressure = (boundary.shapes(own.segment, own.s) * nodal[number]).sum(axis=1) / solution.unit
+    full, meets = np.asarray(zone.active.all(axis=1))[number], closed[number]
+    sides = [_side(solution, points, own, pressure, meets, points.stretch[0])]
+    if points.facing is not None:
+        stretch = points.stretch[1]
+        sides.append(_side(solution, points, points.facing, -pressure, meets, stretch))
     # An overlap of two bodies costs the energy of the softer one.
     stiffness = np.min([side.stiffness for side in sides], axis=0)
-    closed, depth = _gap_squares(solution, line, points, pressure, full, stiffness)
-    terms: BoundaryTerms = _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
-    every, weight = np.arange(len(pressure)), points.own.weight / len(sides)
+    opened, depth = _gap_squares(solution, contact, points, pressure, full, stiffness)
+    terms: BoundaryTerms = _normal(sides, pressure, full, contact.bilateral)  # (3.10), (3.10')
+    every, weight = np.arange(len(pressure)), own.weight / len(sides)
     for x in sides:  # (3.11), (3.11'): no friction
         share = PressureShare(every, x.points.segment, x.points.s, x.across[..., 1])
         terms += [
             BoundaryResidual("tangential", x.element, x.weight, x.across[..., 0], [share]),
-            Squares("complementarity", x.element, weight * closed),
+            Squares("complementarity", x.element, weight * opened),
             Squares("penetration", x.element, weight * depth),
         ]
     return terms, covered
@@ -271,12 +312,14 @@ def at_nodes(
     line = pair.line
     pressure = line.on_segments(pair.pressure, np.nan)
     active = line.on_segments(pair.active, True)
-    nodes, (segment, s) = boundary.nodes[line.segments].ravel(), boundary.at_nodes(line.segments)
-    for other in pairs if (line.rows < 0).any() else ():
-        if other is pair:
+    nodes = boundary.nodes[line.segments].ravel()
+    without = nodes[np.isnan(pressure).ravel()]
+    for other in pairs if without.size else ():
+        if other is pair or not np.isin(other.line.node, without).any():
             continue
         missing = np.isnan(pressure).ravel()
         at = np.flatnonzero(missing & np.isin(nodes, other.line.node))
+        segment, s = boundary.at_nodes(line.segments)
         d = rays(boundary, line.contact, segment[at], s[at])
         # At a corner the point whose direction is the nearer one.
         alike = np.where(nodes[at, None] == other.line.node, d @ other.line.direction.T, -1.0)
@@ -297,8 +340,9 @@ def _pressure_on_segments(values: Array, places: Array) -> Array:
     values = np.where(missing, 0.0, values)
     for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
         known = ~missing[k]
-        through = Polynomial.fit(places[k, known], values[k, known], known.sum() - 1)
-        values[k, missing[k]] = through(places[k, missing[k]])
+        powers = np.vander(2 * places[k] - 1, known.sum())
+        through = np.linalg.solve(powers[known], values[k, known])
+        values[k, missing[k]] = powers[missing[k]] @ through
     return values
 
 
@@ -318,22 +362,27 @@ class _Side:
 
 
 def _side(
-    solution: ScaledSolution, points: FacingPoints, pressure: Array, meets: Mask, *, own: bool
+    solution: ScaledSolution,
+    faced: FacingPoints,
+    points: BoundaryPoints,
+    pressure: Array,
+    meets: Mask,
+    stretch: Array,
 ) -> _Side:
-    """Tractions of one body where segments meet the other; `pressure` (k,) is pi_h or -pi_h."""
-    boundary, d = solution.boundary, points.direction
-    here = points.own if own else points.facing
-    segment, s, weight = here
-    stretch, element = points.stretch[0 if own else 1], boundary.element[segment]
-    t = np.stack([solution.traction(segment, s), boundary.normal(segment, s)], axis=2)
-    t *= stretch[:, None, None]
+    """Tractions of one body, at its `points`, where segments meet the other: a mask `meets` (k,).
+
+    The `pressure` (k,) is pi_h or -pi_h, the `stretch` (k,) that of the body's own arc length.
+    """
+    d, element = faced.direction, solution.boundary.element[points.segment]
+    traction = solution.traction(points.segment, points.s, points.normal)
+    t = np.stack([traction, points.normal], axis=2) * stretch[:, None, None]
     along = np.einsum("kij,ki->kj", t, d)
     across = t - d[:, :, None] * along[:, None, :]
     along[:, 0] += pressure
     return _Side(
-        points=here,
+        points=points,
         element=element,
-        weight=solution.edge_weight[element] * weight * meets / stretch,
+        weight=solution.edge_weight[element] * points.weight * meets / stretch,
         stiffness=solution.rigidity[element] / solution.diameter[element],
         along=along,
         across=across,
@@ -361,10 +410,10 @@ def _normal(sides: list[_Side], pressure: Array, full: Mask, bilateral: bool) ->
         value[:, 0] += sign * tension
         value[at] = side.along[at] / 2
         value[at, 0] += faced.along[at, 0] / 2
-        (segment, s, _), (there, s_there, _) = side.points, faced.points
+        here, there = side.points, faced.points
         shares = [
-            PressureShare(at, there[at], s_there[at], faced.along[at, 1:] / 2),
-            PressureShare(np.arange(len(s)), segment, s, value[:, 1:]),
+            PressureShare(at, there.segment[at], there.s[at], faced.along[at, 1:] / 2),
+            PressureShare(np.arange(len(full)), here.segment, here.s, value[:, 1:]),
         ]
         weight = np.where(full, least, side.weight)
         residuals.append(BoundaryResidual("pressure", side.element, weight, value[:, :1], shares))
@@ -373,27 +422,25 @@ def _normal(sides: list[_Side], pressure: Array, full: Mask, bilateral: bool) ->
 
 def _gap_squares(
     solution: ScaledSolution,
-    line: ContactLine,
+    contact: Contact,
     points: FacingPoints,
     pressure: Array,
     full: Mask,
     stiffness: Array,
 ) -> tuple[Array, Array]:
     """Squares (k,) of complementarity and penetration, per unit of s or eta, by the softer body."""
-    boundary, contact = solution.boundary, line.contact
-    segment, s, _ = points.own
-    u = boundary.evaluate(solution.displacement, segment, s)
-    noise = np.full(len(s), GAP_NOISE * np.abs(u).max())
+    boundary, own, facing = solution.boundary, points.own, points.facing
+    u = boundary.evaluate(solution.displacement, own.segment, own.s)
+    noise = np.full(len(u), GAP_NOISE * np.abs(u).max())
     if contact.gap is None:
-        position = boundary.point(segment, s)
-        noise[points.distance != 0] += GAP_NOISE * np.abs(position).max()
-    if contact.primary is not None:
-        u -= boundary.evaluate(solution.displacement, *points.facing[:2])
+        noise[points.distance != 0] += GAP_NOISE * np.abs(own.position).max()
+    if facing is not None:
+        u -= boundary.evaluate(solution.displacement, facing.segment, facing.s)
     gap = points.distance - (u * points.direction).sum(axis=1)
     gap[np.abs(gap) <= noise] = 0.0  # the estimate has its square root: 1e-8 of 1e-16
     gap /= solution.strain
     opening, depth = np.maximum(gap, 0), np.minimum(gap, 0)
-    cost = partial(closing_energy, solution, points.own, stiffness)
+    cost = partial(closing_energy, solution, own, stiffness, number=points.number)
     if contact.bilateral:  # Remark 3.3: apart is as wrong as overlapping, and any force is right
         return np.zeros_like(gap), cost(gap)
     closed = np.maximum(pressure, 0) * opening  # (3.12), (3.12')
@@ -438,15 +485,17 @@ def on_surfaces(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryT
     active, has = zone.on_segments(pair.active, False), zone.rows >= 0
     full = np.asarray((active | ~has).all(axis=1) & has.any(axis=1))[local]
     u = trace.evaluate(solution.displacement, facet, s)
-    sides = [(trace.element[facet], solution.traction(facet, s) * (size / seen)[:, None], 1.0)]
+    own = solution.traction(facet, s, trace.normal(facet, s)) * (size / seen)[:, None]
+    sides = [(trace.element[facet], own, 1.0)]
     x, distance, shared = trace.point(facet, s), np.zeros(len(pi)), np.zeros_like(full)
     if zone.contact.primary is not None:
         there, distance = opposite(trace, x, d, facing, each.opposite)
         met = np.isfinite(distance)
         weight, distance = weight * met, np.where(met, distance, 0.0)
-        across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
+        normal = trace.normal(facing, there)
+        across = np.abs((normal * d).sum(axis=1))
         u = u - trace.evaluate(solution.displacement, facing, there)
-        other = solution.traction(facing, there) / across[:, None]
+        other = solution.traction(facing, there, normal) / across[:, None]
         sides.append((trace.element[facing], other, -1.0))
         shared = full
     if zone.contact.gap is not None:

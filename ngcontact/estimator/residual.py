@@ -34,13 +34,13 @@ On an enlarging zone forces are per unit eta along xi.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, power_of_two, root_of_squares
+from ..arrays import Array, Index, Mask, power_of_two, root_of_squares, rows_of
 from ..fem import NEARLY_INCOMPRESSIBLE, law_measures, nearly_incompressible, rough_moduli
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
@@ -140,14 +140,13 @@ def on_supports_and_loads(solution: ScaledSolution, points: BoundaryPoints) -> B
 
     Of solids data are not looked at between them.
     """
-    boundary, problem, (segment, s, ds) = solution.boundary, solution.problem, points
+    boundary, problem, segment, s = solution.boundary, solution.problem, points.segment, points.s
     plane = problem.dim == 2
-    residual = -solution.traction(segment, s)  # (3.7)
+    residual = -solution.traction(segment, s, points.normal)  # (3.7)
     for pattern in problem.traction:
         at, load = boundary.lies_on(segment, pattern), problem.traction_vector(pattern)
         residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
-    # Of a pressure in the residual; those of solids are not corrected.
-    factor = -boundary.normal(segment, s) if plane else np.zeros_like(residual)
+    factor = -points.normal  # of a pressure in the residual
     squares = _rough_tractions(solution, segment, s, residual)
     for pattern, data in problem.displacement.items():  # (3.6)
         at = boundary.lies_on(segment, pattern)
@@ -157,21 +156,21 @@ def on_supports_and_loads(solution: ScaledSolution, points: BoundaryPoints) -> B
         if plane:
             squares.append(_displacement(solution, boundary.segments(pattern), given))
         else:
-            squares.append(_displacement_at(solution, points.some(at), given))
+            squares.append(_displacement_at(solution, rows_of(points, at), given))
     guided = np.zeros(len(segment), dtype=bool)
     if problem.guide is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, problem.guide)
         if plane:
-            normal, off_guide = _off_guide(solution, points.some(guided), problem.guide)
+            normal, off_guide = _off_guide(solution, rows_of(points, guided), problem.guide)
             squares.append(off_guide)
         else:
-            normal = boundary.normal(segment[guided], s[guided])
+            normal = points.normal[guided]
         for vector in (residual, factor):
             along = (vector[guided] * normal).sum(axis=1)
             vector[guided] -= along[:, None] * normal
 
     element = boundary.element[segment]
-    weight = solution.edge_weight[element] * ds
+    weight = solution.edge_weight[element] * points.weight
     terms = BoundaryTerms(squares)
     for name, at in (("traction", ~guided), ("sliding", guided)):
         share = PressureShare(np.arange(at.sum()), segment[at], s[at], factor[at])
@@ -239,12 +238,12 @@ def _displacement_at(
     solution: ScaledSolution, points: BoundaryPoints, data: dict[int, ng.CoefficientFunction]
 ) -> Squares:
     """2 mu |u_D - u_h|^2 / h at `points`, with u_D, `data` by component."""
-    boundary, (segment, s, ds) = solution.boundary, points
+    boundary, segment, s = solution.boundary, points.segment, points.s
     u, element = boundary.evaluate(solution.displacement, segment, s), boundary.element[segment]
     missed = [u[:, k] - boundary.evaluate(f, segment, s)[:, 0] for k, f in data.items()]
     square = ((np.array(missed) / solution.strain) ** 2).sum(axis=0)
     weight = 2 * solution.mu[element] / solution.diameter[element]
-    return Squares("displacement", element, weight * ds * square)
+    return Squares("displacement", element, weight * points.weight * square)
 
 
 def _off_guide(
@@ -294,14 +293,13 @@ def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> E
             outer[covered] = False
         places, rule = boundary.rule(order)
         segment, s = boundary.at_places(np.flatnonzero(outer), places)
-        weight = np.tile(rule, len(segment) // len(rule))
+        points = BoundaryPoints.at(boundary, segment, s, np.tile(rule, len(segment) // len(rule)))
+        size = boundary.surface_element(segment, s)
     else:
-        of_pairs = [on_contact(solution, pair, pairs) for pair in pairs]
-        terms = [term for on_pair, _ in of_pairs for term in on_pair]
-        rest = remaining(boundary.inner | boundary.on_axis, [covered for _, covered in of_pairs])
-        _, (segment, s, weight) = rest.points(order)
-    points = BoundaryPoints(segment, s, weight * boundary.surface_element(segment, s))
-    terms += on_supports_and_loads(solution, points)
+        terms, of_pairs = on_contact(solution, pairs)
+        _, points = remaining(boundary.inner | boundary.on_axis, of_pairs).points(boundary, order)
+        size = points.lengths(solution.model)
+    terms += on_supports_and_loads(solution, replace(points, weight=points.weight * size))
     parts = _squares(solution, terms, corrected_from)
     total = np.sum(list(parts.values()), axis=0)
     unit = solution.unit / math.sqrt(solution.modulus)  # of the energy norm

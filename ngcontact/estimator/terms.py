@@ -14,21 +14,32 @@ from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of, summing
 from ..lagrange import gauss
 from ..problem import Problem
 
-VOIGT = {3: ((0, 2), (2, 1)), 6: ((0, 5, 4), (5, 1, 3), (4, 3, 2))}  # numbers, by components
+VOIGT = {3: [[0, 2], [2, 1]], 6: [[0, 5, 4], [5, 1, 3], [4, 3, 2]]}  # numbers, by components
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
 LINE_PARTS = 256  # of a line, by which functions on it are integrated: of 60 waves each has four
 
 
-class BoundaryPoints(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class BoundaryPoints:
     """Points of quadrature on the boundary, in order along segments."""
 
     segment: Index  # (k,)
     s: Array  # (k,), parameters on them, on facets (k, 3)
     weight: Array  # (k,)
+    position: Array  # (k, d), on the curves of the mesh
+    slope: Array  # (k, 2), derivative of that with respect to s, on facets (k, 3, 2)
+    normal: Array  # (k, d), outward unit vectors of the mesh
 
-    def some(self, at: Mask) -> BoundaryPoints:
-        """Those `at` (k,)."""
-        return BoundaryPoints(self.segment[at], self.s[at], self.weight[at])
+    @staticmethod
+    def at(boundary: BoundaryTrace, segment: Index, s: Array, weight: Array) -> BoundaryPoints:
+        """Those at `s` (k, ...) of segments `segment` (k,), each of a `weight` (k,)."""
+        slope = boundary.derivative(segment, s)
+        normal = boundary.outward(segment, slope)
+        return BoundaryPoints(segment, s, weight, boundary.point(segment, s), slope, normal)
+
+    def lengths(self, model: Model) -> Array:
+        """Arc length, about an axis area, per s, (k,), of plane bodies."""
+        return np.asarray(np.linalg.norm(self.slope, axis=1) * model.measure(self.position))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +50,13 @@ class Parts:
     start: Array  # (r,), an interval of its parameter
     stop: Array  # (r,)
 
-    def points(self, order: int) -> tuple[Index, BoundaryPoints]:
+    def points(self, boundary: BoundaryTrace, order: int) -> tuple[Index, BoundaryPoints]:
         """Number of its part (k,) and place of each Gauss point exact to a degree, weights in s."""
         rule, weight = gauss(order)
         part = np.arange(len(self.segment)).repeat(len(rule))
         length = (self.stop - self.start)[:, None]
         s, weights = self.start[:, None] + length * rule, length * weight
-        return part, BoundaryPoints(self.segment[part], s.ravel(), weights.ravel())
+        return part, BoundaryPoints.at(boundary, self.segment[part], s.ravel(), weights.ravel())
 
 
 def fine_parts(size: Array, some: Mask) -> tuple[Index, Array, Array]:
@@ -171,21 +182,16 @@ class ScaledSolution:
         energy = (force / self.unit) ** 2 / (2 * self.mu[element])
         return Squares("loads", element, energy * self.measure[element])
 
-    def traction(self, segment: Index, s: Array) -> Array:
-        """Traction sigma_h n (k, d) over `unit`, at points `s` (k, ...) of each `segment` (k,)."""
-        return self.boundary.traction(tensor(self.projected), segment, s)
+    def traction(self, segment: Index, s: Array, normal: Array) -> Array:
+        """Traction (k, d) over `unit` at `s` (k, ...) of `segment` (k,) by the `normal` (k, d)."""
+        voigt = self.boundary.evaluate(ng.BoundaryFromVolumeCF(self.projected), segment, s)
+        return (voigt[:, VOIGT[voigt.shape[1]]] @ normal[:, :, None])[..., 0]
 
 
 def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
     """(xx, yy, xy) of a stress (2, 2), of a solid's (3, 3) also those with z, in Voigt's order."""
     rows = {4: (0, 3, 1), 9: (0, 4, 8, 5, 2, 1)}[stress.dim]
     return summing(stress.dim, *((row,) for row in rows)) * stress.Reshape((stress.dim,))
-
-
-def tensor(voigt: ng.CoefficientFunction) -> ng.CoefficientFunction:
-    """The stress (2, 2), of a solid (3, 3), of components in Voigt's order."""
-    rows = VOIGT[voigt.dim]
-    return ng.CF(tuple([voigt[k] for row in rows for k in row]), dims=(len(rows), len(rows)))
 
 
 def oscillation(solution: ScaledSolution) -> Array:
@@ -204,10 +210,12 @@ def divergence_and_jump(
     stress: ng.GridFunction,
 ) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
     """Div sigma and [sigma n] of a projected stress, two of d components."""
-    voigt = VOIGT[stress.dim]
+    voigt, size = VOIGT[stress.dim], stress.dim
     d, rows = len(voigt), [tuple([len(row) * k + j for j, k in enumerate(row)]) for row in voigt]
-    divergence = summing(stress.dim * d, *rows) * ng.Grad(stress).Reshape((stress.dim * d,))
-    return divergence, tensor(stress - stress.Other()) * ng.specialcf.normal(d)
+    divergence = summing(size * d, *rows) * ng.Grad(stress).Reshape((size * d,))
+    every = summing(size, *((k,) for row in voigt for k in row))
+    jump = (every * (stress - stress.Other())).Reshape((d, d))
+    return divergence, jump * ng.specialcf.normal(d)
 
 
 def element_integral(

@@ -228,8 +228,12 @@ class BoundaryTrace:
         return gauss(degree)
 
     def normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
-        return rightward(self.derivative(segment, s)) * self.side[segment, None]
+        """Outward unit normals (k, d) of the mesh at `s` (k, ...) of segments `segment` (k,)."""
+        return self.outward(segment, self.derivative(segment, s))
+
+    def outward(self, segment: Index, slope: Array) -> Array:
+        """These normals (k, 2) of `segment` (k,), by the derivatives `slope` (k, 2) there."""
+        return rightward(slope) * self.side[segment, None]
 
     def _feet(
         self, segment: Index, points: Array, s: Array

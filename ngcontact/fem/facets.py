@@ -16,7 +16,7 @@ from typing import ClassVar
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, rightward
 from ..mesh import CadEdge, CadFace, feet_on_faces
 from ..reference import triangle
 from .boundary import BoundaryTrace
@@ -74,10 +74,9 @@ class FacetTrace(BoundaryTrace):
         """Barycentric coordinates (g, 3) and weights (g,) of `triangle.gauss`."""
         return triangle.gauss(degree)
 
-    def normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 3) of the mesh at `s` (k, 3) of facets `segment` (k,)."""
-        vectors = self.area_vector(segment, s)
-        return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    def outward(self, segment: Index, slope: Array) -> Array:
+        """Outward unit normals (k, 3) of `segment` (k,), by the derivatives `slope` (k, 3, 2)."""
+        return rightward(slope[..., 0], slope[..., 1]) * self.side[segment, None]
 
     def _feet(
         self, segment: Index, points: Array, s: Array
