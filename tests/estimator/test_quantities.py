@@ -213,6 +213,7 @@ def test_segments_that_face_in_part(foot, rows, order):
             contact=[Contact("lower_contact", "upper_contact", direction=direction, rows=rows)],
         )
         solution = solve(problem, order=order)
+        without_proof(solution)
         area = solution.quantities()["contact area"]
         assert abs(area.value - width) <= area.error + 1e-12
         if rows == "nodal":
@@ -255,7 +256,9 @@ def test_bars_of_areas_know_that_contact_opens_beside_a_corner(scene, counts, or
         materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
         contact=[pair.swapped() if swap else pair],
     )
-    area = solve(problem, maxh=3 / max(counts), order=order).quantities()["contact area"]
+    solution = solve(problem, maxh=3 / max(counts), order=order)
+    without_proof(solution)
+    area = solution.quantities()["contact area"]
     assert abs(area.value - expected) <= area.error < most
 
 
@@ -303,7 +306,7 @@ def test_the_pressure_as_a_function(scene, order):
         "rings": lambda: cases.ring_in_ring().problem,
         "axis": lambda: axisymmetric_cases.hertz_contact()[0],
     }[scene]()
-    solution = solve(problem, maxh=0.1, order=order)
+    solution = solve(problem, maxh=0.2, order=order)
     field, [state] = solution.pressure_field(), solution.pairs
     trace, rows = solution.discrete.space.trace, state.line.rows
     segment, s = trace.at_nodes(state.line.segments)

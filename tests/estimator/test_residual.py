@@ -290,8 +290,7 @@ def test_waves_between_the_vertices_of_a_support():
 
 
 @pytest.mark.filterwarnings("ignore:gap .* has a feature")
-@pytest.mark.parametrize("order", [1, 2])
-def test_many_waves_of_a_gap_in_one_segment(order):
+def test_many_waves_of_a_gap_in_one_segment():
     """3.6 of them: measured 1.24 and 1.07, and .93 and .60 by one rule for each segment."""
     problem = Problem(
         geometry=compound(rectangle("block", (0, 1), (0, 0.5))),
@@ -303,6 +302,7 @@ def test_many_waves_of_a_gap_in_one_segment(order):
         ],
     )
     reference = Overkill(solve(problem, order=4, maxh=0.02))
-    solution = solve(problem, order=order, maxh=0.125)
-    error, _ = reference.energy_error(solution)
-    assert 1 <= solution.error_estimate / error <= 1.5
+    for order in (1, 2):
+        solution = solve(problem, order=order, maxh=0.125)
+        error, _ = reference.energy_error(solution)
+        assert 1 <= solution.error_estimate / error <= 1.5

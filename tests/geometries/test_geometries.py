@@ -114,7 +114,7 @@ SOLIDS = [
 
 
 def mesh_of(geometry, maxh=0.4, order=3):
-    mesh = ng.Mesh(geometry.GenerateMesh(maxh=maxh))
+    mesh = ng.Mesh(geometry.GenerateMesh(maxh=maxh, parallel_meshing=False))  # threads would wait
     mesh.Curve(order)
     return mesh
 

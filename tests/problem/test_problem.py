@@ -211,7 +211,9 @@ def empty():
 
 
 def solid():
-    return ng.Mesh(OCCGeometry(Box(Pnt(0, 0, 0), Pnt(1, 1, 1))).GenerateMesh(maxh=1))
+    return ng.Mesh(
+        OCCGeometry(Box(Pnt(0, 0, 0), Pnt(1, 1, 1))).GenerateMesh(maxh=1, parallel_meshing=False)
+    )
 
 
 def astray():

@@ -29,6 +29,11 @@ def press_fit(geometry):
     )
 
 
+def meshed(geometry, maxh):
+    """By one thread: others cost a hundred times the processor time."""
+    return ng.Mesh(geometry.GenerateMesh(maxh=maxh, parallel_meshing=False))
+
+
 def unmatched(one, other, held=()):
     """A mesh of both shells whose nodes do not face each other, with these sizes.
 
@@ -40,12 +45,12 @@ def unmatched(one, other, held=()):
         face.name = "held" if face.name in held else face.name
     for part in (*shape.faces, *shape.solids):
         part.maxh = one if part.name in ("inner", "inner_contact", "hole") else other
-    return ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=max(one, other)))
+    return meshed(occ.OCCGeometry(shape), max(one, other))
 
 
 @pytest.mark.parametrize("secondary", ["inner_contact", "outer_contact"])
 def test_of_shells_with_equal_facets_the_convex_side_is_secondary(secondary):
-    mesh = ng.Mesh(shells().GenerateMesh(maxh=0.4))
+    mesh = meshed(shells(), 0.4)
     pair = Contact("inner_contact", "outer_contact", roles="auto")
     pair = pair if pair.secondary == secondary else pair.swapped()
     assert with_roles(boundary_trace(mesh, 1), pair).secondary == "inner_contact"
@@ -83,7 +88,7 @@ def test_exact_normals(order):
     """Of a sphere and of a cylinder, to round-off, on a refined mesh, at the seam and at a pole."""
     ball, pin = occ.Sphere((0, 0, 0), 1), named("pin", occ.Cylinder((4, 0, 0), occ.Z, 1, 2))
     ball.solids.name = ball.faces.name = "ball"
-    mesh = ng.Mesh(occ.OCCGeometry(occ.Compound([ball, pin])).GenerateMesh(maxh=0.6))
+    mesh = meshed(occ.OCCGeometry(occ.Compound([ball, pin])), 0.6)
     mesh.Refine()
     mesh.Curve(order)
     trace = boundary_trace(mesh, order)
