@@ -116,13 +116,6 @@ def check(given_, contact, tolerance=1e-13, **options):
     return basis
 
 
-def test_corner_has_two_rows_at_one_node():
-    for turn in (1e-5, 0.1, 1.5, 3.0):
-        contact = rows(2, (0, unit(0.2), {1: 1.0}), (0, unit(0.2 + turn), {1: 1.0}))
-        basis = check(conditions(), contact, tolerance=1e-15 / min(turn, 1))
-        assert sorted(basis.unknown.tolist()) == [0, 2]
-
-
 def test_row_moves_where_its_share_of_the_free_direction_is_small():
     def host(share, *more):
         d = np.array([share, -np.sqrt(1 - share**2)])

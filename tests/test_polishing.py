@@ -12,7 +12,6 @@ from drivers.benchmark.scenes.problems import BLOCK, DISC
 from drivers.reference.cases import (
     UPWARDS,
     disc_on_rigid_plane,
-    hertz_contact,
     one_transition,
     partly_opening_block,
     pressure_patch,
@@ -73,18 +72,6 @@ def test_block_that_opens():
     assert polished.contact_force() == pytest.approx([0, BLOCK.force], rel=1e-9, abs=1e-9)
     assert polished.pressure.max() == pytest.approx(BLOCK.peak, rel=2e-7)  # of six digits
     assert polished.transitions()[0, 0] == pytest.approx(BLOCK.half_width, rel=5e-7)  # of seven
-
-
-def test_hertz():
-    """Two ends, a zone of a twentieth of the blocks."""
-    half_width = 0.05
-    case = hertz_contact(half_width=half_width)
-    *_, coarse = adapt(case.problem, tolerance=2e-2)
-    polished = polish(coarse, digits=7)
-    assert relative_energy_error(polished, case.exact) < 1e-4
-    assert abs(polished.contact_force()[1]) == pytest.approx(case.exact.P, rel=1e-7)
-    ends = np.sort(polished.transitions()[:, 0])
-    assert ends == pytest.approx([-half_width, half_width], rel=2e-6)
 
 
 @cache

@@ -42,17 +42,6 @@ def circle(radius=1.0, count=12, degree=2, centre=(0.0, 0.0)):
     return np.asarray(centre) + radius * np.stack([np.cos(theta), np.sin(theta)], axis=2)
 
 
-def test_rays_that_meet_nothing():
-    curve = graph(lambda x: 0 * x, [0, 1])
-    points, directions = rays([[-0.1, 1.0], [1.1, 1.0], [0.5, 1.0]], DOWN)
-    found = cast(points, directions, curve, upward(curve))
-    assert found.segment.tolist() == [-1, -1, 0]
-    assert np.isinf(found.distance[:2]).all()
-    # From behind, and along the curve, no point faces.
-    assert (cast(points, -directions, curve, upward(curve)).segment == -1).all()
-    assert (cast(*rays(points, [1.0, 0.0]), curve, upward(curve)).segment == -1).all()
-
-
 @pytest.mark.parametrize("count", [1, 2, 5])
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_rays_that_cross_a_segment_twice(count, degree):
@@ -131,13 +120,6 @@ def test_coincident_nodes(order):
     beyond = coincident(points + 1e-9, -normals, nodes, normals, reach)
     assert (beyond == -1).all()
     assert (coincident(points, normals, nodes, normals, reach) == -1).all()  # from behind
-
-
-def test_coincident_vertex_of_two_segments():
-    """At a corner the row of each side has its partner on the segment that opposes it."""
-    points, reach = np.ones((2, 2)) * [1.0, 0.0], np.full(2, 1e-9)
-    normals = np.array([[0.0, 1.0], [1.0, 0.0]])
-    assert coincident(points, -normals, points, normals, reach).tolist() == [0, 1]
 
 
 @pytest.mark.parametrize("radius", [0.1, 0.5, 0.9, 1.1, 2.0, 3.0])

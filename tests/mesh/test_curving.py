@@ -7,7 +7,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.geom2d import SplineGeometry
-from netgen.occ import Axis, Glue, OCCGeometry, WorkPlane
+from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks, disc
@@ -136,21 +136,3 @@ def test_segments_lie_on_the_edge_of_their_region(make):
         np.testing.assert_allclose(foot, points, atol=1e-12)
         met.add(region)
     assert len(met) == len(mesh.GetBoundaries())
-
-
-@pytest.mark.parametrize("angle", [0.5, 10.0, 70.0, 250.0])
-@pytest.mark.parametrize("turned", [0.0, 33.0])
-def test_arcs_are_those_of_the_geometry_kernel(angle, turned):
-    """By a formula, which is not asked for each point, also where an arc is short."""
-    face = WorkPlane().Arc(2.0, angle).LineTo(0.3, 5.0).Close().Face()
-    [arc] = [
-        edge
-        for edge in face.Rotate(Axis((1, 2, 0), (0, 0, 1)), turned).edges
-        if not CadEdge(edge).straight
-    ]
-    edge = CadEdge(arc)
-    assert edge.circle
-    t = np.linspace(edge.start, edge.stop, 37)
-    for found, exact in ((edge.point(t), arc.Value), (edge.derivative(t), arc.Tangent)):
-        expected = np.array([(v.x, v.y) for v in map(exact, t.tolist())])
-        np.testing.assert_allclose(found, expected, rtol=0, atol=8e-15)  # 8 eps of a size of 4

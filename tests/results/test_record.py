@@ -9,6 +9,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import adapt, solve
+from tests.results.test_archive import ROOT
 from tests.results.test_values import two_blocks
 
 
@@ -64,19 +65,11 @@ def test_a_run_is_quiet_unless_asked(capsys):
 CELLS = [
     """
 import numpy as np
-from ngcontact import Contact, Elastic, Problem, adapt
-from ngcontact.geometries import disc_on_block
-steel = Elastic(E=210e9, nu=0.3)
-problem = Problem(
-    geometry=disc_on_block(radius=1.0),
-    materials={"disc": steel, "block": steel},
-    displacement={"block_bottom": (0, 0), "disc_top": (0, -0.02)},
-    sliding="axis",
-    contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-)
+from drivers.reference import cases
+from ngcontact import adapt
 before = np.geterr()
 """,
-    "for solution in adapt(problem, tolerance=2e-2, progress=True): print(solution)",
+    "for solution in adapt(cases.pressed_disc(), tolerance=2e-2, progress=True): print(solution)",
     "solution.draw()",
     "solution",
     "assert np.geterr() == before",
@@ -90,7 +83,8 @@ def test_a_notebook_shows_lines_and_a_widget():
     nbclient, nbformat = map(pytest.importorskip, ("nbclient", "nbformat"))
     cells = [nbformat.v4.new_code_cell(code) for code in CELLS]
     notebook = nbformat.v4.new_notebook(cells=cells)
-    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    here = {"metadata": {"path": ROOT}}
+    nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3", resources=here).execute()
     _, levels, drawn, [solution], _ = (cell.outputs for cell in notebook.cells)
     told, printed = (
         "".join(out["text"] for out in levels if out["name"] == name).splitlines()

@@ -8,11 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ngcontact import Contact, Elastic, Hooke, Problem, solve
-from ngcontact.contact import FacingPieces, divided
-from ngcontact.discrete import discretise, first_active_set, minimise_energy
-from ngcontact.fem import stress_of
 from ngcontact.problem import MeshArrays, move_vertices
-from ngcontact.reference import triangle
 from tests.solids.meshes import boxes
 
 LAWS = {"upper": Elastic(1.0, 0.3), "lower": Elastic(3.0, 0.2)}
@@ -141,49 +137,6 @@ def test_faces_behind_others_do_not_count(order, direction):
     expected = np.diag([0.0, 0.0, -1.0])
     assert np.abs(stresses(solution.mesh, solution.stress) - expected).max() < 1e-10  # as above
     assert np.abs(solution.pressure - 1.0).max() < 1e-10
-
-
-def uncovered(discrete, parts, facets):
-    """Nodal forces (n,) of the pressure 1 on the parts of `facets` (k,) that face nothing."""
-    trace = discrete.space.trace
-    L, w = triangle.gauss(2 * trace.order)
-    q, area = trace.nodes.shape[1], trace.sizes(facets)
-    f, every = np.zeros(trace.space.ndof), np.arange(len(facets))
-    corners = np.tile(np.eye(3), (len(facets), 1, 1))
-    whole = FacingPieces(every, corners, every, corners[:, 0], np.ones(len(facets)))
-    for some, sign in ((whole, 1.0), (parts, -1.0)):
-        at = facets[some.local]
-        shapes = trace.shapes(np.repeat(at, len(w)), some.places(L)).reshape(len(at), len(w), q)
-        size = area[some.local] * some.share
-        np.add.at(f, trace.nodes[at], sign * np.einsum("r,g,rgi->ri", size, w, shapes))
-    return f
-
-
-@pytest.mark.parametrize(("order", "accuracy"), [(1, 1e-9), (2, 1e-8), (3, 1e-6)])
-def test_overhang(order, accuracy):
-    """A cube on a wider block as secondary, whose uncovered part carries the same pressure.
-
-    The accuracy is that of M^-1 where a facet faces in a small part: measured 2e-13, 3e-12, 2e-9.
-    """
-    mesh = blocks(3, 4, width=1.45)
-    problem = pressed(mesh, "lower")
-    discrete = discretise(problem, mesh, order, "isoparametric")
-    trace, [zone] = discrete.space.trace, discrete.lines
-    facets = trace.segments("lower_top")
-    parts = divided(trace, zone.contact, facets, zone.facing)
-    share = parts.covered(len(facets))
-    assert np.count_nonzero((share > 1e-9) & (share < 1 - 1e-9)) > 5
-    assert share @ trace.sizes(facets) == pytest.approx(1.0, abs=1e-12)  # the cube's face
-    n = trace.space.ndof
-    f = np.concatenate([np.zeros(2 * n), -uncovered(discrete, parts, facets)])
-    program = replace(discrete.program, b=discrete.program.b + discrete.basis.T.T @ f)
-    discrete = replace(discrete, program=program)
-    found = minimise_energy(discrete, first_active_set(discrete))
-    assert found.steps == [0]
-    assert (zone.weight > 0).all()
-    stress = stresses(mesh, stress_of(problem, discrete.displacement(found.u, None)))
-    assert np.abs(stress - np.diag([0.0, 0.0, -1.0])).max() < accuracy
-    assert found.force.sum() == pytest.approx(1.0, abs=1e-10)
 
 
 def rotated(C, R):

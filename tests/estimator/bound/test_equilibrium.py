@@ -135,26 +135,6 @@ def test_the_certificate_is_of_the_tractions(certified):
     assert off[np.broadcast_to(free[:, None], off.shape)].max() <= ROUND_OFF * found.largest
 
 
-def resultant(solution):
-    """Of p* on straight lines."""
-    trace = solution.discrete.space.trace
-    [p] = solution.equilibrated.pressure
-    length = np.linalg.norm(np.diff(trace.curve[p.segments][:, [0, -1]], axis=1)[:, 0], axis=1)
-    return float((length * np.abs(np.diff(p.span, axis=1))[:, 0]) @ p.coefficients.mean(axis=1))
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("rows", ["nodal", "dual"])
-def test_a_body_that_contact_alone_holds(rows, order):
-    """P* balances the load exactly, and is nowhere negative."""
-    pair = Contact("upper_contact", "lower_contact", rows=rows)
-    problem = opening(sliding="lower_axis", traction={"pressed|top": 1.0}, contact=[pair])
-    solution = solve(problem, maxh=0.4, order=order)
-    settled(solution)
-    assert resultant(solution) == pytest.approx(2.0, rel=1e-9)
-    assert solution.equilibrated.pressure[0].coefficients.min() >= 0
-
-
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.5), (2, 0.5), (3, 0.5), (2, 0.3)])
 @pytest.mark.study(witness=["2-0.5"])
 def test_a_pin_that_may_turn(order, maxh):

@@ -11,7 +11,7 @@ from netgen.occ import Circle, Glue, OCCGeometry
 
 from drivers.adaptive_study.runs import levels_of
 from drivers.reference import axisymmetric_cases, cases
-from drivers.reference.laws import bent_fibres, pressed_fibres, stiff_and_soft
+from drivers.reference.laws import pressed_fibres
 from drivers.reference.overkill import Overkill
 from drivers.reference.straight import energy_error
 from drivers.reference.westergaard import moduli
@@ -171,26 +171,6 @@ def test_body_forces_and_tractions(make, order, size):
     for solution in levels(make, order, size):
         assert 1 <= effectivity(solution, make().exact)
         assert solution.bound_parts["loads"] > 0
-
-
-LAWS = {
-    "fibres, 1e2": (lambda: bent_fibres(1e2, 0.0), 0.1),
-    "fibres, 1e4": (lambda: bent_fibres(1e4, 0.0), 0.1),
-    "fibres, 1e8": (lambda: bent_fibres(1e8, 0.0), 0.1),
-    "pressed fibres, 1e2": (lambda: pressed_fibres(1e2, 0.5), 0.15),
-    "pressed fibres, 1e4": (lambda: pressed_fibres(1e4, 0.5), 0.15),
-    "layers, 1e6": (lambda: stiff_and_soft(1e6), 0.1),
-}
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.study(witness=["fibres, 1e4-2"])
-def test_stiff_laws(law, order):
-    make, maxh = LAWS[law]
-    case = make()
-    solution = solve(case.problem, maxh=maxh, order=order)
-    assert 1 <= effectivity(solution, case.exact)
 
 
 def with_shear(inner, factor=1.0):
