@@ -162,37 +162,6 @@ def test_indentation(make, order):
     assert at == pytest.approx([exact.a] if make is cases.indented_by_cone else [], rel=2e-3)
 
 
-def dish(size=1.0, modulus=1.0):
-    """A dish pressed on a plane: contact in a ring. Lengths times size, moduli times modulus."""
-    gap = ng.x / size - 0.5
-    return Problem(
-        geometry=cases.cylinders(outer=size, height=size),
-        materials={
-            body: Elastic(E=modulus * law.E, nu=law.nu) for body, law in cases.BLOCKS.items()
-        },
-        displacement={"bottom": (None, 0), "top": (None, -0.02 * size)},
-        contact=[
-            Contact("upper_contact", "lower_contact", direction=(0, -1), gap=size / 2 * gap * gap)
-        ],
-        model="axisymmetric",
-    )
-
-
-@pytest.mark.parametrize(("size", "modulus"), [(2.0**-10, 1.0), (1.0, 1e9), (2.0**-10, 1e-9)])
-@pytest.mark.parametrize("order", [2, 3])
-def test_all_units(size, modulus, order):
-    """Nothing depends on them where Netgen makes the same mesh: in larger units it does not."""
-    one = solve(dish(), maxh=0.25, order=order)
-    assert len(one.transitions()) == 2  # a ring with an end on either side, none at the axis
-    assert not one.active[np.argmin(one.points[:, 0])]
-    other = solve(dish(size, modulus), maxh=0.25 * size, order=order)
-    assert np.array_equal(one.active, other.active)
-    assert other.pressure == pytest.approx(modulus * one.pressure, rel=1e-6, abs=1e-8 * modulus)
-    assert other.transitions() == pytest.approx(size * one.transitions(), rel=1e-6)
-    estimate = pytest.approx(one.relative_error_estimate, rel=1e-6)
-    assert other.relative_error_estimate == estimate
-
-
 def test_a_plane_problem_has_no_hoop_stress():
     problem = replace(cases.pressed_cylinders(), model="plane strain")
     with pytest.raises(ValueError, match="plane model has no hoop stress: out_of_plane_stress"):

@@ -64,16 +64,6 @@ def test_what_a_polished_solution_serves(tmp_path):
     assert loaded.energy == pytest.approx(polished.energy, rel=1e-12)
 
 
-def test_block_that_opens():
-    *_, coarse = adapt(partly_opening_block(), tolerance=1e-2)
-    polished = polish(coarse, digits=8)
-    assert polished.order == 10
-    assert -polished.energy == pytest.approx(BLOCK.energy, rel=1e-8)
-    assert polished.contact_force() == pytest.approx([0, BLOCK.force], rel=1e-9, abs=1e-9)
-    assert polished.pressure.max() == pytest.approx(BLOCK.peak, rel=2e-7)  # of six digits
-    assert polished.transitions()[0, 0] == pytest.approx(BLOCK.half_width, rel=5e-7)  # of seven
-
-
 @cache
 def solved_root():
     """The square root of one end within one percent."""

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from drivers.stress import Outcome, data
@@ -40,15 +39,6 @@ def test_waves_that_no_bound_is_known_for():
 def test_an_estimate_or_bound_below_the_error_fails(monkeypatch, name):
     monkeypatch.setattr(Solution, name, property(lambda solution: 1e-6))
     assert not data.outcome(2).passed
-
-
-def test_a_strip_that_no_point_of_the_mesh_sees_is_not_lost():
-    """Its load is integrated where it is; |u|^2 - |u_h|^2 is the squared error."""
-    drawn = data.narrow_traction(np.random.default_rng(112))
-    coarse, fine = (data.finest(problem, 100.0) for problem in (drawn.problem, drawn.resolved))
-    error = np.sqrt(fine.energy_norm**2 - coarse.energy_norm**2)
-    assert 0 < error <= coarse.error_estimate  # measured: 1.15 and 1.94
-    assert error <= coarse.error_bound
 
 
 SEEDS = (11, 12, 13, 25, 59, 38, 6, 29, 63, 31, 43)  # every kind and check, soon done

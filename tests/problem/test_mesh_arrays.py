@@ -3,13 +3,11 @@
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import OCCGeometry
 from ngsolve.meshes import MakeStructured3DMesh
 
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import compound
 from ngcontact.problem import MeshArrays
-from ngcontact.problem.checks import _inside
 from tests.scenes import rectangle
 
 
@@ -64,12 +62,3 @@ def problem(left=0.0, size=1.0, **changes):
 def test_what_is_refused(changes, message, size):
     with pytest.raises(ValueError, match=message):
         solve(problem(size=size, **changes), maxh=size / 2)
-
-
-def test_places_inside_a_body_are_told_beside_slanted_sides():
-    corners = [(1, 0), (0, 1), (-1, 0), (0, -1)]
-    geometry = OCCGeometry(body("diamond", polygon(corners, ["free"] * 4)), dim=2)
-    view = MeshArrays(ng.Mesh(geometry.GenerateMesh(maxh=0.4)))
-    x = np.random.default_rng(0).uniform(-1.2, 1.2, (200, 2))
-    found = _inside(x, view, np.arange(len(view.elements)))
-    np.testing.assert_array_equal(found, np.abs(x).sum(axis=1) < 1)

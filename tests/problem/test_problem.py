@@ -11,7 +11,7 @@ from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks
-from ngcontact.problem import MeshArrays, numbers
+from ngcontact.problem import numbers
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
@@ -105,15 +105,6 @@ def test_problem_normalises(make, mesh):
         'Problem(plane strain; bodies block, punch; contact "punch_bottom" with "block_top")'
     )
     assert make(displacement=None).displacement == {}
-
-
-def test_bodies_are_the_connected_pieces(mesh):
-    height = np.asarray(mesh.ngmesh.Coordinates())[:, 1]
-    body = MeshArrays(mesh).pieces
-    assert len(np.unique(body)) == 2
-    assert len(np.unique(body[height < 0.99])) == len(np.unique(body[height > 1.01])) == 1
-    glued = ng.Mesh(OCCGeometry(Glue(shapes()), dim=2).GenerateMesh(maxh=1))
-    assert len(np.unique(MeshArrays(glued).pieces)) == 1
 
 
 @pytest.mark.parametrize(

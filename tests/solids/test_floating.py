@@ -56,16 +56,6 @@ def test_loads_that_nothing_resists(pull, words):
     assert failure.value.body == "upper"
 
 
-def test_eccentric_load():
-    """Moments of contact forces are those of the load."""
-    load = ng.CF((0, 0, -(1 + ng.x)))
-    solution = solve(cube_on_block(counts=(2, 3), traction={"upper_top": load}), order=2)
-    assert solution.force.sum() == pytest.approx(1.0, abs=1e-12)
-    # int x (1 + x) over the top
-    assert solution.force @ solution.points[:, 0] == pytest.approx(1 / 12, abs=1e-10)
-    assert solution.force @ solution.points[:, 1] == pytest.approx(0.0, abs=1e-10)
-
-
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_load_through_an_edge(order):
     """Its forces would be on a line, whose energy is infinite; just beside it they are spread."""

@@ -147,24 +147,24 @@ def test_nothing_in_contact():
         assert all(row.value == 0 for row in solution.quantities())
 
 
-def indented(length=1.0, stress=1.0):
-    """A block under a rigid paraboloid, whole, in units of length and stress."""
-    low, high = (-length, -length, -length), (length, length, 0)
+def indented():
+    """A block under a rigid paraboloid, whole, whose lowest point is .1 in it."""
     return Problem(
-        boxes(("a", low, high, (8, 8, 4)), turn=TURN),
-        {"a": Elastic(stress, 0.3)},
+        boxes(("a", (-1, -1, -1), (1, 1, 0), (8, 8, 4)), turn=TURN),
+        {"a": Elastic(1.0, 0.3)},
         displacement={"a_bottom": (0, 0, 0)},
-        contact=[Contact("a_top", direction=TURN[:, 2], gap=paraboloid(length))],
+        contact=[
+            Contact(
+                "a_top",
+                direction=TURN[:, 2],
+                gap=lambda x, y, z: (x * x + y * y + z * z) / 2 - 0.1,
+            )
+        ],
     )
 
 
-def paraboloid(length):
-    """Its distance from the plane through the origin, less than nothing at its lowest point."""
-    return lambda x, y, z: (x * x + y * y + z * z) / length / 2 - 0.1 * length
-
-
 @pytest.mark.parametrize("order", [1, 2])
-def test_closed_ends_in_all_units(order):
+def test_closed_ends(order):
     one = solve(indented(), order=order)
     [end] = one.transitions()
     assert np.array_equal(end[0], end[-1])
@@ -175,14 +175,6 @@ def test_closed_ends_in_all_units(order):
     assert one.contact_area() == pytest.approx(enclosed, rel=1e-12)
     angle = np.unwrap(np.arctan2(y, x))
     assert abs(angle[-1] - angle[0]) == pytest.approx(2 * math.pi)  # once around
-    for length, stress in ((1e4, 1e9), (1e-4, 1e-9)):
-        other = solve(indented(length, stress), order=order)
-        [same] = other.transitions()
-        assert np.abs(same / length - end).max() < 1e-8
-        for row, known in zip(other.quantities(), one.quantities(), strict=True):
-            unit = {"force": stress * length**2, "contact": length**2, "energy": stress * length**3}
-            size = unit.get(row.name.split()[0].rstrip(","), stress)
-            assert row.value / size == pytest.approx(known.value, rel=1e-8, abs=1e-12), row.name
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
