@@ -12,7 +12,7 @@ from ngcontact.arrays import by_field, dense
 from ngcontact.contact import by_line, contact_line, lines_together
 from ngcontact.discrete import carried_active_set
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
 from tests.given_meshes import mesh_of
 
@@ -111,10 +111,9 @@ def test_a_body_that_hangs_beside_changes_no_indicator():
     pressed, beside = ((0.0, 1.0), "left"), ((2.5, 1.05), "right")
     discs = []
     for centre, name in (pressed, beside):
-        quarters = [(math.pi / 2 * i, math.pi / 2 * (i + 1)) for i in range(4)]
-        sides = [f"{name}_{side}" for side in ("top", "top", "arc", "arc")]
-        outline = [(n, arc(centre, 1.0, *q)) for n, q in zip(sides, quarters, strict=True)]
-        discs.append(body(name, outline))
+        around = enumerate(("top", "top", "arc", "arc"))
+        arcs = [(f"{name}_{s}", quarter_arc(centre, 1.0, k, (k + 1) % 4)) for k, s in around]
+        discs.append(body(name, arcs))
     block = body(
         "block", polygon([(4, 0), (-2, 0), (-2, -2), (4, -2)], ["top", "side", "rim", "side"])
     )

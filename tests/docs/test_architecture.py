@@ -2,18 +2,25 @@
 
 import inspect
 import re
+from importlib import import_module
 from itertools import islice
-from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from drivers.reference import cases
 from ngcontact import adapt, solve
-from tests.docs.pages import resolved
+from tests.docs.pages import DOCS, resolved
 from tests.runs import recorded
 
 NEW = "run python docs/developers/architecture.py"
+
+
+@pytest.fixture
+def script(monkeypatch):
+    """A script of docs/developers by its name."""
+    monkeypatch.syspath_prepend(DOCS / "developers")
+    return import_module
 
 
 @pytest.fixture
@@ -51,7 +58,7 @@ def test_walk_goes_the_way_of_the_code(architecture, name):
     assert [step for step in steps if inspect.unwrap(resolved(step)).__code__ in way] == steps
 
 
-THEORY = (Path(__file__).parents[2] / "docs" / "theory.md").read_text()
+THEORY = (DOCS / "theory.md").read_text()
 
 
 @pytest.fixture

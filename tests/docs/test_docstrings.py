@@ -9,9 +9,6 @@ import ast
 import inspect
 import re
 
-import pytest
-
-import ngcontact.geometries as geometries
 from ngcontact import Solution
 from tests.docs.pages import ROOT
 
@@ -118,15 +115,3 @@ def test_a_solution_says_its_units():
     said = dict(members()) | {"displacement": entry(inspect.getdoc(Solution), "displacement")}
     assert len(said) > 20
     assert not [name for name, text in said.items() if not UNIT.search(text)]
-
-
-@pytest.mark.parametrize("name", geometries.__all__)
-def test_geometries_say_their_units(name):
-    """Each number in its entry, or "Lengths are in any consistent unit" in the text for all."""
-    function = getattr(geometries, name)
-    docstring = inspect.getdoc(function)
-    parameters = inspect.signature(function).parameters.items()
-    numbers = [parameter for parameter, kind in parameters if "float" in str(kind.annotation)]
-    assert numbers
-    if "Lengths are in any consistent unit" not in docstring:
-        assert not [n for n in numbers if not UNIT.search(entry(docstring, n))]

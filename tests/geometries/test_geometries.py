@@ -139,7 +139,9 @@ def test_docstrings_list_the_regions_of_every_geometry():
     for make, options, _ in CASES + SOLIDS:
         found.setdefault(make, set()).update(names_of(make(**options)))
     for make, names in found.items():
-        assert names == set(re.findall(r"^``(\w+)`` ", inspect.getdoc(make), flags=re.MULTILINE))
+        text = inspect.getdoc(make)
+        assert names == set(re.findall(r"^``(\w+)`` ", text, flags=re.MULTILINE))
+        assert "Lengths are in any consistent unit" in text
 
 
 @pytest.mark.parametrize(("make", "options", "sizes"), CASES + SOLIDS)
