@@ -48,12 +48,11 @@ def test_a_spherical_shell_shrunk_on_another(order, maxh, limit, rows):
 @pytest.mark.parametrize("order", [2, 3, 4])
 def test_a_modulus_that_varies_with_the_radius(order):
     """Nu = 0: sigma_zz = E(r) times a strain, all else 0, which the elements contain."""
-    problem = Problem(
-        geometry=cases.cylinders(),
+    problem = replace(
+        cases.pressed_cylinders(),
         materials={"upper|lower": Elastic(1 + 3 * ng.x**2, 0.0)},
         displacement={"bottom": (None, 0), "top": (None, -0.02)},
-        contact=[Contact("upper_contact", "lower_contact")],
-        model="axisymmetric",
+        traction={},
     )
     solution = solve(problem, maxh=0.25, order=order)
     force = 2 * math.pi * 0.01 * (1 / 2 + 3 / 4)

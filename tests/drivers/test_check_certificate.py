@@ -5,6 +5,7 @@ import copy
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import ngsolve as ng
@@ -13,7 +14,7 @@ import pytest
 
 from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases, laws
-from ngcontact import Contact, Problem, solve
+from ngcontact import Contact, solve
 from tests.estimator.bound.test_energies import SCENES as BOUNDED
 from tests.estimator.bound.test_equilibrium import opening
 
@@ -28,14 +29,11 @@ def on_obstacle():
 
 def with_forces():
     """Rings under radial and axial forces that are no polynomials."""
-    return Problem(
-        geometry=axisymmetric_cases.cylinders(0.5),
-        materials=cases.BLOCKS,
+    return replace(
+        axisymmetric_cases.pressed_cylinders(0.5),
         displacement={"bottom": (0, 0), "top": (None, -1.0)},
         traction={"upper_side": (0, ng.sin(9 * ng.y))},
         force={"upper|lower": (ng.x * ng.y, ng.exp(ng.x * ng.y))},
-        contact=[Contact("upper_contact", "lower_contact")],
-        model="axisymmetric",
     )
 
 

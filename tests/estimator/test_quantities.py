@@ -10,7 +10,7 @@ from netgen.occ import Box, Circle, Compound, OCCGeometry
 
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, disc, rings
+from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import compound
 from tests.discrete.test_equilibrium import loose
 from tests.given_meshes import two_blocks
@@ -272,13 +272,7 @@ def test_stresses_are_not_looked_at_on_an_axis():
 @pytest.mark.parametrize(("order", "h"), [(1, 0.2), (2, 0.5), (3, 0.5), (4, 0.5)])
 def test_a_disc_weighs_more_than_its_mesh(order, h):
     """Half of its weight, pi / 4 of a quarter, is on the drawing's domain; none is proved there."""
-    problem = Problem(
-        geometry=disc(),
-        materials={"disc": Elastic(E=200.0, nu=0.3)},
-        sliding="axis",
-        force={"disc": (0, -1)},
-        contact=[Contact("arc", direction=(0, -1), gap=ng.y)],
-    )
+    problem = replace(cases.disc_on_rigid_plane(), displacement={}, force={"disc": (0, -1)})
     q = solve(problem, maxh=h, order=order).quantities()
     off = abs(q["force"].value - np.pi / 4)
     assert 1e-9 < off <= q["force"].error

@@ -10,9 +10,8 @@ import pytest
 from netgen.occ import Axis, OCCGeometry, Z
 
 from drivers.reference import cases
-from ngcontact import ContactWarning, Elastic, Problem, adapt, solve
+from ngcontact import ContactWarning, Elastic, adapt, solve
 from ngcontact.adaptivity import below_resolution
-from ngcontact.geometries import disc
 from ngcontact.mesh import first_mesh
 from ngcontact.plausibility import contradictions, estimates_rise, warn_of_implausible
 from ngcontact.problem import MeshArrays
@@ -78,12 +77,8 @@ def test_a_guide_off_by_the_seventh_digit_contradicts_nothing():
 def test_round_off_is_no_contradiction():
     """On the axis the radial displacement e r is 1e-35 where Netgen's corner lies at r = 1e-32."""
     widened = (1e-3 * ng.x, 0.0)
-    problem = Problem(
-        geometry=disc(),
-        materials={"disc": Elastic(E=200.0, nu=0.3)},
-        displacement={"arc": widened, "top": widened},
-        sliding="axis",
-    )
+    held = {"arc": widened, "top": widened}
+    problem = replace(cases.disc_on_rigid_plane(), displacement=held, contact=[])
     assert contradictions(problem, first_mesh(problem, 0.4)) == []
 
 

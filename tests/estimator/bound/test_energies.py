@@ -12,11 +12,11 @@ from drivers.reference import axisymmetric_cases, cases, paper
 from drivers.reference.overkill import Overkill
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.estimator.bound import force_bar
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import compound
 from tests.estimator.bound.test_equilibrium import opening
 from tests.estimator.bound.test_exact import settled
 from tests.given_meshes import two_blocks
-from tests.scenes import unmatched_blocks
+from tests.scenes import rectangle, unmatched_blocks
 
 ANISOTROPIC = Hooke([[100.0, 20.0, 5.0], [20.0, 10.0, 1.0], [5.0, 1.0, 3.0]])
 BILATERAL = [Contact("upper_contact", "lower_contact", bilateral=True)]
@@ -225,9 +225,8 @@ ROUGH = {  # largest effectivity; measured 1.11, 1.17, 1.05, 1.05, without verti
 def test_tractions_that_are_rough_inside_segments(name):
     """Errors by the energy of a graded solution of order 4, which is 1e3 times nearer."""
     load, effectivity = ROUGH[name]
-    outline = polygon([(0, 0), (2, 0), (2, 1), (0, 1)], ["foot", "side", "top", "left"])
     problem = Problem(
-        geometry=compound(body("block", outline)),
+        geometry=compound(rectangle("block", (0, 2), (0, 1), ("foot", "side", "top", "left"))),
         materials={"block": LAW},
         displacement={"left": (0, None)},
         traction={"top": (0, load)},

@@ -12,8 +12,8 @@ from numpy.polynomial import legendre
 
 from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases
-from ngcontact import Contact, Elastic, Hooke, Problem, solve
-from ngcontact.geometries import rings
+from ngcontact import Contact, Elastic, Hooke, solve
+from tests.discrete.test_equilibrium import loose
 from tests.estimator.bound.test_exact import settled
 from tests.scenes import unmatched_blocks
 
@@ -36,14 +36,11 @@ def weighted(**changes):
 
 def about_an_axis(inner):
     """Cylinders under an axial load and a radial force that vary."""
-    return Problem(
-        geometry=axisymmetric_cases.cylinders(inner),
-        materials=cases.BLOCKS,
+    return replace(
+        axisymmetric_cases.pressed_cylinders(inner),
         displacement={"bottom": (0, 0)},
         traction={"top": (0, -0.01 * (1 + ng.x))},
         force={"upper|lower": (0.01 * ng.x * ng.y, -0.005)},
-        contact=[Contact("upper_contact", "lower_contact")],
-        model="axisymmetric",
     )
 
 
@@ -139,13 +136,8 @@ def test_the_certificate_is_of_the_tractions(certified):
 @pytest.mark.study(witness=["2-0.5"])
 def test_a_pin_that_may_turn(order, maxh):
     """No pressure along the normals does work on its rotation, nor loads but for round-off."""
-    problem = Problem(
-        geometry=rings(0.5, 1.0, 2.0, interference=-1e-2),
-        materials={"inner|outer": LAW},
-        displacement={"rim": (0, 0)},
-        traction={"hole": (0, -1e-3)},
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
+    pair = Contact("outer_contact", "inner_contact")
+    problem = replace(loose((0, 0)), traction={"hole": (0, -1.0)}, contact=[pair])
     solution = solve(problem, maxh=maxh, order=order)
     settled(solution)
     assert solution.error_bound < 2 * solution.error_estimate

@@ -15,7 +15,7 @@ from drivers.reference.laws import pressed_fibres
 from drivers.reference.overkill import Overkill
 from drivers.reference.straight import energy_error
 from drivers.reference.westergaard import moduli
-from ngcontact import Elastic, Problem, adapt, solve
+from ngcontact import Elastic, adapt, solve
 from ngcontact.estimator.bound import error_bound
 from tests.given_meshes import two_blocks
 from tests.quadrature.test_loads import loaded, square
@@ -177,15 +177,14 @@ def with_shear(inner, factor=1.0):
     """U = (r z, r^2 + z^2) / 100 with what it takes of body forces, held on all sides."""
     r, z, law = ng.x, ng.y, moduli(cases.FIRST)
     walls = "top|bottom|upper_side|lower_side|upper_contact|lower_contact"
-    return Problem(
-        geometry=axisymmetric_cases.cylinders(inner),
+    walls += "" if inner == 0 else "|axis"
+    return replace(
+        axisymmetric_cases.pressed_cylinders(inner),
         materials={"upper|lower": cases.FIRST},
-        displacement={
-            walls if inner == 0 else walls + "|axis": (0.01 * r * z, 0.01 * (r * r + z * z))
-        },
+        displacement={walls: (0.01 * r * z, 0.01 * (r * r + z * z))},
+        traction={},
         force={"upper|lower": (0, -0.01 * factor * (10 * law.mu + 4 * law.lam))},
         contact=[],
-        model="axisymmetric",
     )
 
 
