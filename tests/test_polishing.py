@@ -18,11 +18,11 @@ from drivers.reference.cases import (
     touching_blocks,
 )
 from drivers.reference.straight import relative_energy_error
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, polish, solve
-from ngcontact.geometries import ball_on_block
+from ngcontact import ContactWarning, adapt, polish, solve
 from ngcontact.polishing.geometric_mesh import END_RATIO, coarse_mesh
 from ngcontact.polishing.polishing import solve_bilateral
 from tests.given_meshes import two_blocks
+from tests.scenes import pressed_ball
 
 
 @cache
@@ -94,17 +94,12 @@ def refused():
     bilateral = replace(plane, contact=[replace(plane.contact[0], bilateral=True)])
     dual = replace(touching, contact=[replace(touching.contact[0], rows="dual")])
     given = replace(touching, geometry=two_blocks(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9)))
-    solid = Problem(
-        geometry=ball_on_block(),
-        materials={"ball|block": Elastic(E=1.0, nu=0.3)},
-        contact=[Contact(secondary="ball_surface", primary="block_top", direction=(0, 0, -1))],
-    )
     return {
         "digits=0": (coarse, 0),
         "digits=13": (coarse, 13),
         "digits=8.0 is not an integer": (coarse, 8.0),
         "not a Problem": (plane, 8),
-        "solids": (replace(coarse, problem=solid), 8),
+        "solids": (replace(coarse, problem=pressed_ball(0.1)), 8),
         "bodies of revolution": (replace(coarse, problem=replace(plane, model="axisymmetric")), 8),
         "is bilateral": (solve(bilateral, maxh=0.5), 8),
         "geometry, not a mesh": (solve(given), 8),

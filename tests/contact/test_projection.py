@@ -66,22 +66,6 @@ def test_rays_that_cross_a_segment_twice(count, degree):
     np.testing.assert_allclose(found.distance[met], expected[met], atol=1e-11)
 
 
-def test_far_side_of_a_closed_curve_is_not_taken():
-    """Inside a disc that overlaps: up and down are equally good rays, the facing side counts."""
-    curve = circle()
-    side = np.ones(len(curve))  # counterclockwise: outward is to the right
-    points, directions = rays([[0.1, -0.9], [0.1, 0.2], [0.1, 1.7]], DOWN)
-    found = cast(points, directions, curve, side)
-    partner = at(curve, found)
-    assert (partner[:, 1] > 0.9).all()
-    np.testing.assert_allclose(partner[:, 0], 0.1, atol=1e-14)
-    np.testing.assert_allclose(found.distance, points[:, 1] - partner[:, 1], atol=1e-14)
-    # A hole faces with its far side.
-    hole = cast(points, directions, curve, -side)
-    assert (at(curve, hole)[:, 1] < -0.9).all()
-    assert (hole.distance[:2] > 0).all()
-
-
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_rays_through_vertices_find_the_vertex(degree):
     knots = np.array([-1, -0.3, 0.1, 0.7, 1])

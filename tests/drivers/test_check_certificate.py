@@ -96,7 +96,6 @@ def alike(name, change):
 TAMPERED = {
     "a smaller bound": alike("bound", lambda v: v * (1 - 1e-6)),
     "a stress": alike("stress", changed),
-    "all stresses": alike("stress", lambda v: v * (1 + 1e-6)),
     "another degree": alike("degree", lambda v: v - 1),
     "a place of the lattice": alike("lattice", changed),
     "a strain": alike("rule0_strain", lambda v: changed(v, 1.01)),
@@ -116,7 +115,6 @@ TAMPERED = {
     "a pulling pressure": alike("contact_pressure", lambda v: -v),
     "a pressure": alike("contact_pressure", changed),
     "pressures at other ends": alike("contact_pressure", lambda v: v[:, ::-1]),
-    "a long direction": alike("contact_direction", lambda v: v * (1 + 1e-6)),
     "wider sides": alike("contact_weight", lambda v: v * (1 + 1e-6)),
     "another side in contact": alike("contact_side", lambda v: np.roll(v, 1)),
     "an action without reaction": alike("contact_other", lambda v: v * 0 - 1),

@@ -67,7 +67,6 @@ def test_hooke_is_used_as_it_is(mesh):
         ("210e9", 0.3, TypeError, r"E = '210e9': give a real number"),
         (ng.CF((1, 2)), 0.3, ValueError, r"E is a CoefficientFunction of dim 2: give a scalar"),
         (ng.CF(1j), 0.3, TypeError, r"E is a complex CoefficientFunction: it must be real"),
-        (1, 0.5, ValueError, r"nu = 0\.5: Poisson's ratio must lie in -1 < nu < 1/2"),
         (1, math.nan, ValueError, r"nu = nan: give a finite number"),
         (1, -1, ValueError, r"nu = -1\.0: Poisson's ratio must lie in -1 < nu < 1/2"),
     ],

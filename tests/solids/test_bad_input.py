@@ -15,7 +15,7 @@ from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.problem import MeshArrays, move_vertices
 from tests.solids.meshes import boxes, named
-from tests.solids.test_patch import LAWS, blocks, pressed
+from tests.solids.test_patch import blocks, pressed
 
 SOFT = Elastic(1.0, 0.3)
 BOX = {"a": SOFT}
@@ -173,14 +173,8 @@ def test_what_stays_plane():
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2), (2, 4)])
 def test_prescribed_on_both_sides(counts):
     """Bodies that share a plane with prescribed displacements which overlap there."""
-    upper, lower = (3 * (count,) for count in counts)
-    mesh = boxes(("upper", (0, 0, 0), (1, 1, 1), upper), ("lower", (0, 0, -1), (1, 1, 0), lower))
-    problem = Problem(
-        mesh,
-        LAWS,
-        displacement={"upper_left": (0, 0, -0.1), "lower_left": (0, 0, 0)},
-        contact=[Contact("upper_bottom", "lower_top", direction=(0, 0, -1))],
-    )
+    given = {"upper_left": (0, 0, -0.1), "lower_left": (0, 0, 0)}
+    problem = replace(pressed(blocks(*counts)), sliding=None, traction={}, displacement=given)
     with pytest.raises(ValueError, match="violated by prescribed displacements on both sides"):
         solve(problem)
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from netgen.occ import Axis, OCCGeometry, Z
 
-from drivers.reference import cases
+from drivers.reference import axisymmetric_cases, cases
 from drivers.reference.straight import energy_error
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.estimator.quantities.contact import direction_of
-from ngcontact.geometries import blocks, rings, rounded_punch
+from ngcontact.geometries import blocks, rings
 from tests.estimator.bound.test_exact import settled
 
 ONE = Elastic(E=1.0, nu=0.3)
@@ -86,12 +86,6 @@ def test_the_bar_of_a_force_beside_a_curved_guide():
 
 def test_a_guide_on_the_axis_changes_nothing():
     """There u_r = 0 anyway, and the circles of the axis have no length."""
-    problem = Problem(
-        geometry=rounded_punch(),
-        materials={".*": ONE},
-        displacement={"block_bottom": (0, 0), "indenter_top": (None, -0.01)},
-        contact=[Contact("end", "block_top", direction=(0, -1))],
-        model="axisymmetric",
-    )
+    problem, _ = axisymmetric_cases.hertz_contact()
     free, guided = (solve(replace(problem, sliding=x), maxh=0.4) for x in ((), "axis"))
     assert guided.error_bound == pytest.approx(free.error_bound, rel=1e-9)
