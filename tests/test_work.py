@@ -27,20 +27,6 @@ def test_bodies_apart_cost_one_system(order):
     assert solution.work["back_solves"] <= 3  # the load, and what round-off asks to refine
 
 
-@pytest.mark.parametrize(
-    ("problem", "searches", "curved"),
-    [
-        (two_blocks(), 0, False),
-        (cases.ring_in_ring().problem, 0, True),
-        (cases.pressed_disc(), 1, True),
-    ],
-    ids=["matched blocks", "matched rings", "disc on block"],
-)
-def test_only_other_lines_are_searched_and_only_curved_edges_curved(problem, searches, curved):
-    work = solve(problem, maxh=0.3, order=2).work
-    assert (work["gap_searches"], work["curved_elements"] > 0) == (searches, curved)
-
-
 def test_the_estimate_is_made_once_when_it_is_asked_for():
     solution = solve(two_blocks(), maxh=0.3, order=2)
     assert solution.work["estimates"] == 0

@@ -81,9 +81,7 @@ def test_rings_converge_at_the_best_rates(order):
         case = cases.ring_in_ring()
         solution = solve(pressed(case, (n, 3 * n // 2), False), maxh=1.6 / n, order=order)
         errors.append(relative_energy_error(solution, case.exact))
-    assert (
-        np.log2(errors[0] / errors[1]) > {1: 0.88, 2: 1.85, 3: 2.6}[order]
-    )  # measured .91, 2.07, 3.2
+    assert np.log2(errors[0] / errors[1]) > {1: 0.88, 2: 1.85, 3: 2.6}[order]
 
 
 def parts(counts):

@@ -22,18 +22,10 @@ SLOW = ("docs/tutorials/own_geometry.md", "docs/howto/two_round_bodies.md")  # b
 
 # What a page that is no program of its own takes for granted.
 PRESS = """
-from ngcontact import Contact, Elastic, Problem, adapt
-from ngcontact.geometries import blocks
+from drivers.reference.cases import pressure_patch
+from ngcontact import adapt
 
-steel = Elastic(E=210e9, nu=0.3)
-problem = Problem(
-    geometry=blocks(width=1.0),
-    materials={"upper": steel, "lower": steel},
-    displacement={"bottom": (0, 0)},
-    sliding=["upper_left", "lower_left"],
-    traction={"top": 1e6},
-    contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-)
+problem = pressure_patch().problem
 """
 GIVEN = {"docs/bounds.md": PRESS}
 

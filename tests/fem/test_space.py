@@ -12,6 +12,7 @@ from ngcontact.fem import boundary_trace
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh
+from tests.mesh.test_curving import mesh_of
 
 ORDERS = [1, 2, 3, 4]
 STEEL = Elastic(E=2.0, nu=0.3)
@@ -25,10 +26,6 @@ def space_of(mesh, element="physical", order=1, **data):
     data = {"materials": dict.fromkeys(mesh.GetMaterials(), STEEL), **data}
     mesh, _ = curve(mesh, order, element)
     return assemble(Problem(geometry=mesh, **data), boundary_trace(mesh, order), element)
-
-
-def mesh_of(geometry, maxh=0.5):
-    return ng.Mesh(geometry.GenerateMesh(maxh=maxh))
 
 
 CURVED = {

@@ -237,15 +237,12 @@ def test_data_cannot_be_changed_in_place(make):
     for argument in ("materials", "displacement", "traction", "force"):
         data = getattr(problem, argument)
         name, before = next(iter(data)), dict(data)
-        for change in (
-            lambda data=data, name=name: data.__setitem__(name, 10.0),
-            lambda data=data, name=name: data.__delitem__(name),
-            lambda data=data, name=name: data.update({name: 10.0}),
-            lambda data=data, name=name: data.pop(name),
-            lambda data=data, name=name: data.__ior__({name: 1.0}),
+        for change, *given in (
+            *(("__setitem__", name, 10.0), ("__delitem__", name), ("pop", name)),
+            *(("update", {name: 10.0}), ("__ior__", {name: 1.0})),
         ):
             with pytest.raises(TypeError, match=rf"problem\.{argument}.*dataclasses\.replace\("):
-                change()
+                getattr(data, change)(*given)
         assert dict(data) == before
         assert type(data | {}) is dict  # and what is made of it is the caller's
         assert copy.deepcopy(data).keys() == before.keys()

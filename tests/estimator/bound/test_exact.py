@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
@@ -53,12 +54,10 @@ def test_a_solution_in_the_space_has_no_error(reproduced):
     assert solution.work["equilibrations"] == 1
 
 
-def nearly_incompressible():
-    return cases.one_transition(Elastic(E=1.0, nu=0.4999), Elastic(E=3.0, nu=0.4999))
-
-
-def small_zone():
-    return cases.hertz_contact(half_width=0.05)
+nearly_incompressible = partial(
+    cases.one_transition, Elastic(E=1.0, nu=0.4999), Elastic(E=3.0, nu=0.4999)
+)
+small_zone = partial(cases.hertz_contact, half_width=0.05)
 
 
 def by_ratio(make, ratio, swap=False):
