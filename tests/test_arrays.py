@@ -1,4 +1,4 @@
-"""Squares in the range of numbers, normals, sparse arrays from entries, lines of warnings."""
+"""Squares in the range of numbers, normals, short indices of matrices, lines of warnings."""
 
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact import ContactWarning, errors
-from ngcontact.arrays import across, from_triplets, power_of_two, rightward, root_of_squares
+from ngcontact.arrays import across, power_of_two, rightward, root_of_squares
 from ngcontact.errors import warn
 
 
@@ -32,15 +32,6 @@ def test_normals_stand_before_slopes_in_a_positive_basis(d):
         np.testing.assert_array_equal(
             across(normal) * np.linalg.norm(slopes[0], axis=1)[:, None] > 0, slopes[0] > 0
         )
-
-
-@pytest.mark.parametrize("index", [np.int32, np.int64, np.uint64])
-def test_repeated_entries_add(index):
-    rows, columns = np.array([[2, 0, 2, 1], [1, 0, 1, 3]], dtype=index)
-    matrix = from_triplets(np.array([1.0, 2.0, 4.0, 0.0]), rows, columns, (3, 4))
-    assert isinstance(matrix, sp.csr_array)
-    assert matrix.toarray().tolist() == [[2, 0, 0, 0], [0, 0, 0, 0], [0, 5, 0, 0]]
-    assert matrix.indices.dtype == matrix.indptr.dtype == np.int32
 
 
 @pytest.mark.parametrize("order", [1, 2])

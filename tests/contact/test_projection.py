@@ -81,15 +81,6 @@ def test_rays_through_vertices_find_the_vertex(degree):
     assert beyond.segment.tolist() == [-1]
 
 
-def test_vertex_at_the_end_of_the_facing_side():
-    """Only one of the two segments at the vertex faces the ray: that one is taken."""
-    corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
-    found = cast(*rays([[1.0, 0.5]], DOWN), corner, -np.ones(2))
-    assert (found.segment.tolist(), found.s.tolist()) == ([0], [1.0])
-    found = cast(*rays([[1.5, 0.0]], [-1.0, 0.0]), corner, -np.ones(2))
-    assert (found.segment.tolist(), found.s.tolist()) == ([1], [0.0])
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_coincident_nodes(order):
     curve = graph(lambda x: 0.3 * x, [0, 0.4, 1])

@@ -103,27 +103,6 @@ def test_exact_normals(order):
     assert np.abs(trace.exact_normal(facet, s) - radial).max() < 1e-14
 
 
-def test_sliding_on_a_cylinder():
-    """A pin in a rigid hole turns freely and bears a pressure at its ends: plane strain."""
-    pin = named("pin", occ.Cylinder(occ.Pnt(0, 0, 0), occ.Z, 1, 1))
-    nu = 0.3
-    problem = Problem(
-        geometry=occ.OCCGeometry(pin),
-        materials={"pin": Elastic(1.0, nu)},
-        displacement={"pin_bottom": (None, None, 0)},
-        sliding="pin_side",
-        traction={"pin_top": 1.0},
-    )
-    solution = solve(problem, maxh=0.5, order=2)
-    assert [str(motion).split(" ")[0] for motion in solution.free_motions] == ["rotation"]
-    # Confined compression: E (1 - nu) / ((1 + nu) (1 - 2 nu)), on facets of order 2: 1e-3 measured.
-    modulus = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
-    area = ng.Integrate(1, solution.mesh.Boundaries("pin_top"))
-    work = -2 * solution.energy
-    assert work == pytest.approx(area / modulus, rel=5e-3)
-    assert solution.reactions["pin_bottom"][2] == pytest.approx(area, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("order", "secondary"), [(k, side) for k in (1, 2, 3) for side in ("shaft", "hub")]
 )

@@ -221,3 +221,5 @@ def test_the_wide_side_follows_a_round_rim():
     )
     solution = solve(problem, maxh=0.5, order=2)
     assert solution.contact_area() == pytest.approx(0.25 * np.pi, rel=5e-3)
+    # A guide along the exact normals lets it turn.
+    assert [str(motion).split(" ")[0] for motion in solution.free_motions] == ["rotation"]
