@@ -109,17 +109,26 @@ class CadEdge:
     def level(self, axis: Array, values: Array, near: Array) -> Array:
         """Parameters (k,) where coordinates along `axis` (2,), or (k, 2), take `values` (k,).
 
-        Of several such points the one Newton's method reaches from the projections of the points
-        `near` (k, 2); NaN where it reaches none.
+        Of several such points the nearest one to the projections of the points `near` (k, 2), or
+        the one that Newton's method reaches from there; NaN where there is none.
         """
-        axes = np.broadcast_to(axis, near.shape)
+        axes, t = np.broadcast_to(axis, near.shape), self.project(near)
 
         def step(t: Array, at: Index) -> Array:
             slope = (self.derivative(t) * axes[at]).sum(axis=1)
             off = (self.point(t) * axes[at]).sum(axis=1) - values[at]
             return off / np.where(slope == 0, np.inf, slope)
 
-        t = self._newton(self.project(near), step)
+        if self.circle:  # the middle of the crossings, and half the angle between them
+            cosine, sine = self._axes @ axes.T
+            share = (values - axes @ self._centre) / np.hypot(cosine, sine)
+            half = np.arccos(np.clip(share, -1, 1))
+            ways = self._middle + np.arctan2(sine, cosine) - t + np.stack([-half, half])
+            ways = (ways + np.pi) % (2 * np.pi) - np.pi
+            t += np.where(np.abs(ways[0]) < np.abs(ways[1]), *ways)
+            t = np.clip(t, self.start, self.stop)
+        else:
+            t = self._newton(t, step)
         missed = np.abs((self.point(t) * axes).sum(axis=1) - values) > LEVEL_DISTANCE * self.size
         return np.where(missed, np.nan, t)
 
