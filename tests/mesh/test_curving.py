@@ -98,6 +98,19 @@ def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
         np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
 
 
+@pytest.mark.parametrize(("x", "y", "radius"), CENTRES)
+def test_levels_of_a_circle_are_crossings_near_by(x, y, radius):
+    edge = circle(x, y, radius)
+    theta, side = RNG.uniform(0.3, 6, 200), RNG.uniform(-0.1, 0.1, 200)
+    axes = angles(theta + math.pi / 2 + RNG.uniform(-1, 1, 200))  # not along the normal
+    points, near = ([x, y] + radius * angles(t) for t in (theta, theta + side))
+    values = (points * axes).sum(axis=1)
+    scale = np.abs([x, y]).max() / radius + 1  # of round-off in the coordinates
+    found = edge.point(edge.level(axes, values, 1.01 * (near - [x, y]) + [x, y]))
+    np.testing.assert_allclose(found, points, rtol=0, atol=1e-14 * scale * radius)
+    assert np.isnan(edge.level(np.array([0.6, 0.8]), values + 3 * scale * radius, near)).all()
+
+
 def glued():
     """A square with a disc inside, one geometry with an inner boundary and a closed edge."""
     square = WorkPlane().Rectangle(2, 2).Face()
