@@ -119,9 +119,8 @@ class DiscreteProblem(AdmissibleSet):
         """The displacement of least energy that moves the `active` (m,) points by `jumps` (m,).
 
         Supports rest, the other points are free, and there are no loads: one back-solve where there
-        is a factorisation for the active set.
-
-        Active points and supports that leave a rigid motion free are a `ConvergenceError`.
+        is a factorisation for the active set. Active points and supports that leave a rigid motion
+        free are a `ConvergenceError`.
         """
         p, systems = self.program, self.systems
         if not p.null_space.resisted(p.unknown[active]):
