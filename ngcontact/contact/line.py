@@ -127,22 +127,6 @@ def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
     return [values[first:last] for first, last in pairwise(stops)]
 
 
-def in_contact(line: ContactLine, active: Mask) -> Mask:
-    """Points in contact (m,): the `active` (m,) and open ones at corners inside the contact.
-
-    The node touches the other side of the corner, and the next point on this side is active: one
-    of the two rows is released where the node would rather slide off the corner.
-    """
-    state = active.copy()
-    corners = line.twins
-    for i in corners[active[corners].sum(axis=1) == 1].ravel():
-        if not active[i]:
-            first, last = line.rows[:, :-1], line.rows[:, 1:]
-            next_to = np.concatenate([last[first == i], first[last == i]])
-            state[i] = (next_to >= 0).all() and active[next_to].all()
-    return state
-
-
 def with_points(line: ContactLine, keep: Mask) -> ContactLine:
     """The line with its points `keep` (m,) alone; the segments still face the primary."""
     if keep.all():

@@ -6,13 +6,14 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask, distances_along
 from ..fem import ORDERS, Model
-from .line import ContactLine, in_contact
+from .line import ContactLine
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -35,19 +36,22 @@ def _run_of_points(
         run.append(onward[0])
 
 
-def _closing_point(distance: Array, gap: Array, order: int) -> float | None:
-    """Where gap^(2/3), fitted to open points at `distance` (k,) from contact, is 0, or None."""
+def _closing_point(distance: Array, gap: Array, order: int) -> float:
+    """Where gap^(2/3), fitted to open points at `distance` (k,) from contact, is 0.
+
+    Without enough points, or a zero before the last of them, the middle before the first.
+    """
     chosen = slice(SKIPPED_POINTS, SKIPPED_POINTS + max(FIT_POINTS, 3 * order + 2))
     x, y = distance[chosen], np.maximum(gap[chosen], 0.0) ** (2 / 3)
     if len(x) < 2 or y[-1] <= 0:
-        return None
+        return float(distance[0]) / 2
     fit = np.polynomial.Polynomial.fit(x, y, min(FIT_DEGREE, order + 1, len(x) - 1))
     # The last active point may lie on the open side by the error of one element. The zero is
     # bracketed: the roots of a companion matrix are lost where leading coefficients are round-off.
     places, step = np.linspace(-distance[0], x[0], FIT_SAMPLES, retstep=True)
     below = np.flatnonzero(fit(places) <= 0)
     if len(below) == 0 or below[-1] == FIT_SAMPLES - 1:
-        return None
+        return float(distance[0]) / 2
     low = places[below[-1]]
     return float(low + step * brentq(lambda t: fit(low + step * t), 0, 1, xtol=1e-15))
 
@@ -63,59 +67,6 @@ class Transitions:
     # For each end the points from there on, as far as contact is closed or open:
     closed: list[Index]  # the points (q,) from the last active one inwards
     opened: list[Index]  # and those (q,) from the first open one outwards
-
-
-def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
-    """Transitions between neighbours of which one is active.
-
-    Near a frictionless transition the gap grows like the 3/2 power of the distance, so that
-    gap^(2/3) is a smooth function of it with a simple zero at the transition. That zero is found
-    from a cubic fitted to the open points near by, the nearest ones left out. Without enough of
-    them - contact that opens at a few points only - it is the middle between the two points.
-    Between the two points at a corner it is the corner. The `gap` (m,) is that after deformation,
-    points in contact are `active` (m,).
-    """
-    beside: dict[int, list[int]] = defaultdict(list)
-    linked = line.neighbours
-    for a, b in linked.tolist():
-        beside[a].append(b)
-        beside[b].append(a)
-    active = in_contact(line, active)
-    x, order = line.position, line.rows.shape[1] - 1
-    ends, found, beyond = [], [], []
-    inwards: list[Index] = []
-    outwards: list[Index] = []
-    for link in linked[active[linked[:, 0]] != active[linked[:, 1]]].tolist():
-        inner, outer = sorted(link, key=lambda i: not active[i])
-        opened = _run_of_points(outer, inner, beside, active)
-        closed = _run_of_points(inner, outer, beside, active)
-        inwards.append(np.array(closed))
-        outwards.append(np.array(opened))
-        if line.node[inner] == line.node[outer]:  # the node touches one side of a corner only
-            ends.append((inner, opened[min(1, len(opened) - 1)]))
-            found.append(x[inner])
-            beyond.append(0.0)
-            continue
-        if len(opened) > 1 and any(active[i] for i in beside[opened[-1]]):
-            opened = opened[: (len(opened) + 1) // 2]  # its other end uses the other half
-        distance = distances_along(x[[inner, *opened]])[1:]
-        if order > ORDERS[-1]:  # of `polish`: a vertex of the mesh lies there
-            at: float | None = 0.0
-        else:
-            at = _closing_point(distance, gap[opened], order)
-        if at is None:
-            at = distance[0] / 2
-        closed = closed[:2]
-        beyond.append(at)
-        path = np.array([*closed[::-1], *opened])
-        along = distances_along(x[path])
-        at += along[len(closed) - 1]
-        ends.append((inner, outer))
-        found.append([np.interp(at, along, x[path, axis]) for axis in (0, 1)])
-    inner_outer = np.array(ends, dtype=np.intp).reshape(-1, 2)
-    position = np.array(found).reshape(-1, 2)
-    inner, outer = inner_outer.T
-    return Transitions(inner, outer, position, np.array(beyond), inwards, outwards)
 
 
 def ending_segments(line: ContactLine, ends: Transitions) -> Index:
@@ -166,9 +117,61 @@ class ContactState:
         return np.asarray(self.line.on_segments(self.active, False).any(axis=1))
 
     @cached_property
+    def in_contact(self) -> Mask:
+        """Points (m,) that are active, and open ones at corners inside the contact.
+
+        The node touches the other side of the corner, and the next point on this side is active:
+        one of the two rows is released where the node would rather slide off the corner.
+        """
+        state, active, corners = self.active.copy(), self.active, self.line.twins
+        for i in corners[active[corners].sum(axis=1) == 1].ravel():
+            if not active[i]:
+                first, last = self.line.rows[:, :-1], self.line.rows[:, 1:]
+                next_to = np.concatenate([last[first == i], first[last == i]])
+                state[i] = (next_to >= 0).all() and active[next_to].all()
+        return state
+
+    @cached_property
     def transitions(self) -> Transitions:
-        """Transitions from binding to non-binding contact."""
-        return self.ends or transitions_on(self.line, self.gap, self.active)
+        """Transitions from binding to non-binding contact, between neighbours.
+
+        Near a frictionless transition the gap grows like the 3/2 power of the distance, so that
+        gap^(2/3) is a smooth function of it with a simple zero at the transition. That zero is
+        found from a cubic fitted to the open points near by, the nearest ones left out. Without
+        enough of them - contact that opens at a few points only - it is the middle between the two
+        points. Between the two points at a corner it is the corner.
+        """
+        if self.ends is not None:
+            return self.ends
+        line, active, linked = self.line, self.in_contact, self.line.neighbours
+        beside: dict[int, list[int]] = defaultdict(list)
+        for a, b in linked.tolist():
+            beside[a].append(b)
+            beside[b].append(a)
+        x, order, found = line.position, line.rows.shape[1] - 1, list[tuple[Any, ...]]()
+        for link in linked[active[linked[:, 0]] != active[linked[:, 1]]].tolist():
+            inner, outer = sorted(link, key=lambda i: not active[i])
+            outwards = _run_of_points(outer, inner, beside, active)
+            inwards = _run_of_points(inner, outer, beside, active)
+            runs = np.array(inwards), np.array(outwards)
+            if line.node[inner] == line.node[outer]:  # the node touches one side of a corner only
+                found.append((inner, outwards[min(1, len(outwards) - 1)], x[inner], 0.0, *runs))
+                continue
+            if len(outwards) > 1 and any(active[i] for i in beside[outwards[-1]]):
+                outwards = outwards[: (len(outwards) + 1) // 2]  # its other end uses the other half
+            way = 0.0  # of `polish`: a vertex of the mesh lies there
+            if order <= ORDERS[-1]:
+                distance = distances_along(x[[inner, *outwards]])[1:]
+                way = _closing_point(distance, self.gap[outwards], order)
+            path = np.array([*inwards[1::-1], *outwards])
+            along = distances_along(x[path])
+            at = way + along[min(len(inwards), 2) - 1]
+            place = [np.interp(at, along, x[path, axis]) for axis in (0, 1)]
+            found.append((inner, outer, place, way, *runs))
+        columns = list(zip(*found, strict=True)) or [()] * 6
+        points, position = np.array(columns[:2], dtype=np.intp), np.reshape(columns[2], (-1, 2))
+        beyond, closed, opened = np.array(columns[3], dtype=float), *map(list, columns[4:])
+        return Transitions(points[0], points[1], position, beyond, closed, opened)
 
     def expected(self, modulus: float, model: Model) -> ContactState:
         """The state that a finer mesh should find: contact ends where its forces tell.

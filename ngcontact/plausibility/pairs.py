@@ -26,7 +26,6 @@ from ..arrays import Array, Index, across, rows_of
 from ..contact import (
     ContactState,
     facing_pieces,
-    in_contact,
     interpolated_rays,
     opposite,
     prescribed_gap,
@@ -179,7 +178,7 @@ def zones_of(state: ContactState) -> ContactZones:
     line, m, corners = state.line, len(state.gap), state.line.twins
     closed, parts = state.active, line.rows
     if line.dim == 2:
-        closed, parts = in_contact(line, closed), line.neighbours
+        closed, parts = state.in_contact, line.neighbours
     met, opened = ((parts >= 0) & x[parts] for x in (closed, ~closed))
     first = parts[np.arange(len(parts)), met.argmax(axis=1)]
     label = _labels(np.array([(first[:, None] + 0 * parts)[met], parts[met]]).T, m)

@@ -9,8 +9,8 @@ import pytest
 
 from drivers.reference import axisymmetric_cases as cases_about_an_axis
 from ngcontact import solve
-from ngcontact.contact.line import ContactLine, in_contact
-from ngcontact.contact.state import ContactState, continued_to_axis, transitions_on
+from ngcontact.contact.line import ContactLine
+from ngcontact.contact.state import ContactState, continued_to_axis
 from ngcontact.fem import MODELS
 
 
@@ -27,6 +27,11 @@ def line(x, order=1, y=None):
     return Points(position=position, rows=first + np.arange(order + 1), node=np.arange(len(x)))
 
 
+def state_of(line, gap, active):
+    """The state of a line after deformation."""
+    return ContactState(line, gap, np.zeros(len(active)), active)
+
+
 def opening(distance):
     """Gap distance^(3/2) outside of the contact zone, and where there is contact."""
     return np.maximum(distance, 0) ** 1.5, distance < 0
@@ -40,7 +45,7 @@ EXACT = 1e-12
 @pytest.mark.parametrize("end", [0.31, 0.4999, 0.5001, 0.6])
 def test_the_model_end_is_found_exactly(end, order):
     x = np.linspace(0, 1, 13) ** 1.3
-    found = transitions_on(line(x, order), *opening(x - end))
+    found = state_of(line(x, order), *opening(x - end)).transitions
     assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
     [inner], [outer] = found.inner, found.outer
     assert x[inner] < end < x[outer]
@@ -50,7 +55,7 @@ def test_the_model_end_is_found_exactly(end, order):
 def test_two_zones_have_four_ends():
     x = np.linspace(0, 4, 161)
     # Contact in |x - 1| < 0.43 and |x - 3| < 0.43; between them each end has its half.
-    found = transitions_on(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
+    found = state_of(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43)).transitions
     expected = [0.57, 1.43, 2.57, 3.43]
     assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
 
@@ -94,7 +99,7 @@ def test_a_closed_line_has_no_first_point():
         node=np.arange(count),
     )
     from_zero = np.abs((angle + math.pi) % (2 * math.pi) - math.pi)
-    found = transitions_on(ring, *opening(from_zero - end)).position
+    found = state_of(ring, *opening(from_zero - end)).transitions.position
     # Distances are chords, shorter than arcs by h^2 / 24 of them; the end is on a chord of
     # the circle, h^2 / 8 inside.
     h = 2 * math.pi / count
@@ -119,7 +124,7 @@ def test_contact_that_ends_at_a_corner(order):
     active = np.append(x < x[corner] + 1e-9, False)
     gap = np.where(active, 0.0, 1e-3 + lines.position[:, 0] - x[corner])
     for state, outer in ((active, corner + 1), (np.append(x > x[corner] + 1e-9, True), corner - 1)):
-        found = transitions_on(lines, np.where(state, 0.0, gap + 1e-3), state)
+        found = state_of(lines, np.where(state, 0.0, gap + 1e-3), state).transitions
         assert found.position.tolist() == [[x[corner], 0.0]]
         # The warm start takes the way from `inner` to `outer` for the direction of the contact.
         assert found.outer.tolist() == [outer]
@@ -133,7 +138,7 @@ def test_no_end_at_a_corner_inside_the_contact():
     for i in (corner, 9):  # the node has slid off one side of the corner
         one_side = active.copy()
         one_side[i] = False
-        assert len(transitions_on(lines, ~one_side * 1e-6, one_side).position) == 0
+        assert len(state_of(lines, ~one_side * 1e-6, one_side).transitions.position) == 0
 
 
 # Two segments that meet at node 1, where the points 1 and 2 are.
@@ -158,7 +163,7 @@ def mask(text):
 )
 def test_a_point_that_touches_one_side_inside_the_contact(active, expected):
     given = mask(active)
-    assert in_contact(BENT, given).tolist() == mask(expected).tolist()
+    assert state_of(BENT, given, given).in_contact.tolist() == mask(expected).tolist()
     assert given.tolist() == mask(active).tolist()  # the argument stays
 
 

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask, distances_along
-from ...contact import ContactState, in_contact
+from ...contact import ContactState
 from ...fem import Bodies, BoundaryTrace, connected_bodies, prescribed_components
 from ...lagrange import gauss
 from ...solved import Solved
@@ -146,9 +146,7 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     line, ends, carries = pair.line, pair.transitions, pair.line.rows >= 0
     if not pair.active.any():
         return 0.0, 0.0
-    active, closed = (
-        line.on_segments(mask, False) for mask in (pair.active, in_contact(line, pair.active))
-    )
+    active, closed = (line.on_segments(x, False) for x in (pair.active, pair.in_contact))
     places, (t, w) = boundary.places(line.segments), gauss(boundary.geometry_order + 2)
     width = np.diff(places, axis=1)
     s = places[:, :-1, None] + width[:, :, None] * t

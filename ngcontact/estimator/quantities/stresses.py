@@ -18,7 +18,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask, across
-from ...contact import ContactState, in_contact
+from ...contact import ContactState
 from ...fem import BoundaryTrace, boundary_corners, prescribed_components, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
 from ..residual import Estimated
@@ -92,7 +92,7 @@ def _closed(pairs: Sequence[ContactState], place: Array, h: Array) -> tuple[Mask
     """Masks of the vertices at `place` (v, 2): in contact, and in contact with a rigid obstacle."""
     closed, rigid = np.zeros(len(place), dtype=bool), np.zeros(len(place), dtype=bool)
     for pair in pairs:
-        line, active = pair.line, in_contact(pair.line, pair.active)
+        line, active = pair.line, pair.in_contact
         if not len(active):
             continue
         facing = line.position + line.gap[:, None] * line.direction
