@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, Mask, joined
-from ..contact import ContactState, ending_segments
+from ..contact import ContactState
 from ..errors import warn
 from ..fem import BoundaryTrace, boundary_corners, prescribed_components
 from ..mesh import resolved_lengths
@@ -28,9 +28,8 @@ def at_ends(trace: BoundaryTrace, pairs: Sequence[ContactState], share: float) -
     """Elements (ne,) in which contact ends, larger than a `share` of their contact line."""
     marked = np.zeros(trace.mesh.ne, dtype=bool)
     for pair in pairs:
-        line = pair.line
-        segments = line.segments[ending_segments(line, pair.transitions)]
-        extent = np.linalg.norm(np.ptp(line.position, axis=0)) if line.node.size else 0.0
+        x, segments = pair.line.position, pair.ending_segments
+        extent = np.linalg.norm(np.ptp(x, axis=0)) if len(x) else 0.0
         marked[trace.element[segments[trace.lengths(segments) > share * extent]]] = True
     return marked
 

@@ -25,5 +25,4 @@ from .nodal import prescribed_gap as prescribed_gap
 from .nodal import with_roles as with_roles
 from .search import find_contacts as find_contacts
 from .state import ContactState as ContactState
-from .state import ending_segments as ending_segments
 from .state import state_of as state_of

@@ -69,15 +69,6 @@ class Transitions:
     opened: list[Index]  # and those (q,) from the first open one outwards
 
 
-def ending_segments(line: ContactLine, ends: Transitions) -> Index:
-    """Numbers (j,) in `line.segments` where contact ends; at corners, of those beside."""
-    inner = (line.rows[:, :, None] == ends.inner).any(axis=1)
-    outer = (line.rows[:, :, None] == ends.outer).any(axis=1)
-    both = inner & outer
-    at = np.where(both.any(axis=0), both, inner | outer)
-    return np.flatnonzero(at.any(axis=1))
-
-
 # Of the radius of a zone around an axis, over which its pressure is fitted there.
 AXIS_SHARE = 1 / 3
 LONG_SEGMENT = 0.2  # over half a zone, from which its end is told better by force than by gap
@@ -172,6 +163,14 @@ class ContactState:
         points, position = np.array(columns[:2], dtype=np.intp), np.reshape(columns[2], (-1, 2))
         beyond, closed, opened = np.array(columns[3], dtype=float), *map(list, columns[4:])
         return Transitions(points[0], points[1], position, beyond, closed, opened)
+
+    @property
+    def ending_segments(self) -> Index:
+        """Segments (j,) in which contact ends; at corners, those beside."""
+        rows, ends = self.line.rows[:, :, None], self.transitions
+        inner, outer = ((rows == points).any(axis=1) for points in (ends.inner, ends.outer))
+        at = np.where((inner & outer).any(axis=0), inner & outer, inner | outer)
+        return self.line.segments[at.any(axis=1)]
 
     def expected(self, modulus: float, model: Model) -> ContactState:
         """The state that a finer mesh should find: contact ends where its forces tell.
