@@ -18,7 +18,6 @@ from .facing import partners as partners
 from .facing import rays as rays
 from .line import ContactLine as ContactLine
 from .line import by_line as by_line
-from .line import with_points as with_points
 from .nodal import jacobian as jacobian
 from .nodal import nodal_line as nodal_line
 from .nodal import prescribed_gap as prescribed_gap

@@ -46,7 +46,7 @@ from .facing import (
     opposite_segments,
     rays,
 )
-from .line import ContactLine, with_points
+from .line import ContactLine
 from .nodal import jacobian, nodal_line, prescribed_gap, segment_weights, with_roles
 from .projection import MATCHING_DISTANCE
 
@@ -372,7 +372,7 @@ def lines_together(trace: BoundaryTrace, contacts: Sequence[Contact]) -> list[Co
         own = trace.lies_on(line.segments, contact.secondary)
         part = replace(rows_of(line, own, *ContactLine.by_segment), contact=contact)
         points = np.isin(np.arange(len(carries)), part.rows)
-        found.append(_carrying(with_points(part, points), carries[points]))
+        found.append(_carrying(part.with_points(points), carries[points]))
     return found
 
 
@@ -397,7 +397,7 @@ def _carrying(line: ContactLine, carries: Mask) -> ContactLine:
             "choose boundaries that look at each other; the direction points from the secondary "
             "body to the primary one"
         )
-    return with_points(line, carries)
+    return line.with_points(carries)
 
 
 def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> BoundaryTrace:

@@ -67,6 +67,15 @@ class ContactLine:
         same = np.flatnonzero(node[1:] == node[:-1])
         return np.column_stack([order[same], order[same + 1]])
 
+    def with_points(self, keep: Mask) -> ContactLine:
+        """The line with its points `keep` (m,) alone; the segments still face the primary."""
+        if keep.all():
+            return self
+        renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
+        names = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
+        kept = rows_of(self, keep, *names, "coupling", "on_axis", "means")
+        return replace(kept, rows=renumber[self.rows])
+
     def on_segments(self, values: NDArray[Any], missing: Any) -> NDArray[Any]:
         """Values (k, q) at nodes, of `values` (m,), of vectors (k, q, d); `missing` without."""
         last = np.full((1, *values.shape[1:]), missing, values.dtype)
@@ -125,13 +134,3 @@ def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
     """Parts (m_i,) of `values` (m,) over the points of all lines in order, one for each line."""
     stops = list(accumulate((len(line.node) for line in lines), initial=0))
     return [values[first:last] for first, last in pairwise(stops)]
-
-
-def with_points(line: ContactLine, keep: Mask) -> ContactLine:
-    """The line with its points `keep` (m,) alone; the segments still face the primary."""
-    if keep.all():
-        return line
-    renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
-    names = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
-    kept = rows_of(line, keep, *names, "coupling", "on_axis", "means")
-    return replace(kept, rows=renumber[line.rows])

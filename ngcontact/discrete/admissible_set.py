@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask, from_triplets, joined, rows_of
 from ..constraints import BasisTransformation, Conditions, Rows, change_of_basis
-from ..contact import ContactLine, by_line, with_points
+from ..contact import ContactLine, by_line
 from ..fem import BoundaryTrace, Space
 from ..problem import Problem, boundary_mask
 
@@ -125,7 +125,8 @@ def contact_rows(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
 def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
     """The lines with the points that carry the rows `kept` (k,) of all lines together."""
     points = np.isin(np.arange(sum(len(line.node) for line in lines)), kept)
-    return [with_points(*both) for both in zip(lines, by_line(lines, points), strict=True)]
+    parts = zip(lines, by_line(lines, points), strict=True)
+    return [line.with_points(part) for line, part in parts]
 
 
 def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
