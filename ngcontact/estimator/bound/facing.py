@@ -376,7 +376,7 @@ def facing_sides(
     else:
         after, lift = _lifted_gap(vertices, gap, closed, total == 0, narrow, degree)
     vanishes = np.median(after, axis=1) <= 0
-    pressed = np.repeat(vanishes[:, None], of_pressure + 1, axis=1)
+    pressed = np.repeat((closed | vanishes)[:, None], of_pressure + 1, axis=1)
     touched = np.isin(vertices, vertices[closed])
     pressed[:, [0, -1]] |= touched
     return FacingSides(
