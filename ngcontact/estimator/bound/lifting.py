@@ -191,7 +191,7 @@ def _stiffness(
     V[0, 0, 0] = V[0, 1, -1] = V[1, 0, -1] = V[1, 1, 1] = 1.0
     V[0, 2:, 2:-1] = 1.0  # ... and of u_r / r
     kind = [degrees[cells.sides], cells.curved, data.varies[cells.bodies]]
-    for (*own, bent, _), every in alike(kind, layer):
+    for (*own, bent, varies), every in alike(kind, layer):
         inverse = _nodal(degree, *own)
         order, m = 2 * max(own) + 4 * bent, len(inverse)
         for at in np.array_split(every, 1 + len(every) * order**2 * m // BATCH_ENTRIES):
@@ -199,12 +199,19 @@ def _stiffness(
             F, into = _functions(degree, own, points.local) @ inverse, np.linalg.inv(points.slopes)
             C = np.linalg.inv(data.compliance(points))
             S = [V[c] @ C @ V[d].T for c, d in ((0, 0), (0, 1), (1, 1))]
-            rows = into.swapaxes(2, 3) @ F[:, 1:]
-            if axial:
-                rows = np.append(rows, F[:, :1] / points.x[..., :1, None], axis=2)
-            stress = [(points.weight[..., None, None] * x) @ rows for x in S]
-            rows, *stress = (x.reshape(len(at), -1, m) for x in (rows, *stress))
-            xx, xy, yy = (rows.transpose(0, 2, 1) @ x for x in stress)
+            if bent or varies or axial:
+                rows = into.swapaxes(2, 3) @ F[:, 1:]
+                if axial:
+                    rows = np.append(rows, F[:, :1] / points.x[..., :1, None], axis=2)
+                stress = [(points.weight[..., None, None] * x) @ rows for x in S]
+                rows, *stress = (x.reshape(len(at), -1, m) for x in (rows, *stress))
+                xx, xy, yy = (rows.transpose(0, 2, 1) @ x for x in stress)
+            else:  # integrals of products of derivatives are those of one triangle
+                w, into = points.weight, into[:, 0]
+                table = np.einsum("q,qim,qjn->ijmn", w[0], F[:, 1:], F[:, 1:], optimize=True)
+                size = (w[:, 0] / w[0, 0])[:, None, None]
+                by = [(size * (into @ x[:, 0] @ into.swapaxes(1, 2))).reshape(-1, 4) for x in S]
+                xx, xy, yy = ((x @ table.reshape(4, -1)).reshape(-1, m, m) for x in by)
             K = np.block([[xx, xy], [xy.transpose(0, 2, 1), yy]])
             outer = np.arange(2 * m) % m < sum(own)
             whole, across = K[:, outer][..., outer], K[:, ~outer][..., outer]

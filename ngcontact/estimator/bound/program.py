@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, Mask
 from ...errors import ContactError
 from ...linalg import cholesky, lower_half, summed
 from ...qp import (
@@ -224,12 +224,13 @@ def dual_problem(
     d, fixed = int(mu.start[-1]), given.fixed(mu)
     firsts = [mu.start[line.side, None] + np.arange(line.psi.shape[1]) for line in lines]
     unknown, null_space = _joined(firsts, np.intp), no_null_space(d)
-    R, T = _basis(mu, lines, unknown)
-    # Where rows concern a triangle its part is one of y: their rows of T are not those of 1.
-    other = abs(T - sp.eye_array(d)).sum(axis=1) > 0
+    turned = np.zeros(d, dtype=bool)  # multipliers whose rows of T are not those of 1
+    for line in lines:
+        turned[mu.of(line.side)[0]] = True
+    R, T = _basis(mu, lines, unknown, turned)
     blocks, concerned = list[tuple[Index, Index, Array]](), list[tuple[Index, Index, Array]]()
     for e in elements:
-        some = other[e.dofs].any(axis=1)
+        some = turned[e.dofs].any(axis=1)
         for parts, own in ((blocks, ~some), (concerned, some)):
             N, at = e.N[own], e.dofs[own]
             parts.append((at, at, N.transpose(0, 2, 1) @ N))
@@ -263,11 +264,10 @@ def _joined(parts: Sequence[Any], kind: type = float) -> Any:
 
 
 def _basis(
-    mu: Multipliers, lines: Sequence[FacingSides], unknown: Index
+    mu: Multipliers, lines: Sequence[FacingSides], unknown: Index, turned: Mask
 ) -> tuple[sp.csr_array, sp.csr_array]:
-    """`DualProblem.R` and `.T`, by the `unknown` (m,) of each row."""
+    """`DualProblem.R` and `.T`, by the `unknown` (m,) of each row and the `turned` ones (d,)."""
     d, m, own, across, solved = int(mu.start[-1]), 0, [], [], []
-    plain = np.ones(d, dtype=bool)
     for line in lines:
         means = line.psi.T * (line.weight[:, None] / line.mass[..., None])  # (k, n, j)
         load = means[:, :, None] * line.direction.swapaxes(1, 2)[:, None]
@@ -277,7 +277,6 @@ def _basis(
             some = mu.degree[line.side] == degree
             R = (load[some] @ traces(degree, POINTS)).reshape(*row[some].shape, -1)
             at, rest = mu.of(line.side[some])[0], np.linalg.svd(R)[2][:, R.shape[1] :]
-            plain[at] = False
             own.append((row[some], at, R))
             solved.append((at, at, np.linalg.inv(np.concatenate([R, rest], axis=1))))
         some = np.flatnonzero(line.other >= 0)
@@ -285,7 +284,7 @@ def _basis(
         R = -(load[some] @ traces(at.shape[1] // 2 - 1, line.there[some])[:, None])
         R = R.reshape(*row[some].shape, at.shape[1]) * there[:, None]
         across.append((row[some], at, R))
-    part = summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
+    part = summed(solved, (d, d)) + sp.diags_array((~turned).astype(float), format="csr")
     R = summed(across, (m, d))
     M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary
     while (part := M @ part).nnz:  # as often as bodies stand in a row
