@@ -23,7 +23,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, from_triplets
-from ..fem import moduli_of
 from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays, region_mask
 from ..quadrature import local_functions
@@ -64,8 +63,7 @@ def pressure_correction(
     pressures = ng.L2(mesh, order=solution.order, dgjumps=True)
     motions = ng.VectorH1(mesh, order=solution.order, definedon=region)
     (delta, t), (v, w) = pressures.TnT(), motions.TnT()
-    bulk = moduli_of(problem, mesh).bulk / solution.modulus
-    weights = solution.element_weight, solution.edge_weight, solution.mu, bulk
+    weights = solution.element_weight, solution.edge_weight, solution.mu, solution.bulk
     element, edge, mu, kappa = map(solution.on_elements, weights)
     edge = (edge + edge.Other()) / 2
     bedding = FLOATING / float(np.ptp(solution.boundary.curve, axis=(0, 1)).max()) ** 2

@@ -104,6 +104,7 @@ def scaled(solved: Solved) -> ScaledSolution:
         modulus=modulus,
         mu=stiffness.shear / modulus,
         rigidity=stiffness.rigidity / modulus,
+        bulk=stiffness.bulk / modulus,
         incompressibility=stiffness.ratio,
         rough=rough,
         diameter=boundary.arrays.diameters,

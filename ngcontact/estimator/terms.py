@@ -120,7 +120,8 @@ class ScaledSolution:
     modulus: float
     mu: Array  # (ne,), the smallest stiffness, see `fem.Moduli`
     rigidity: Array  # (ne,), the largest one
-    incompressibility: Array  # (ne,), bulk modulus over mu
+    bulk: Array  # (ne,), kappa
+    incompressibility: Array  # (ne,), kappa over mu, in the middle
     rough: Mask  # (ne,), elements in which the law varies by more than a part of itself
     diameter: Array  # (ne,), h, a length
 
