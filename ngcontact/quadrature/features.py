@@ -390,14 +390,12 @@ def _in_body(
             continue
         part = tuple(slice(max(k.min() - wide, 0), k.max() + wide + 2) for k in np.nonzero(some))
         here = inside[part]
-        lost = [
-            np.where(here, np.maximum(*(_lost(x, w, here) for x in (array[part], -array[part]))), 0)
-            for w in windows
-        ]
-        # Around convex corners of a part more is lost in the wide window, if not at a sample.
-        for window, (now, then) in zip(windows[1:], pairwise(lost), strict=True):
-            around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
-            flagged[part] |= (now > limit) & (around[1] < LOSS_GROWTH * around[0])
+        for side in (array[part], -array[part]):  # beside a layer at the rim the rest is a valley
+            lost = [np.where(here, _lost(side, window, here), 0) for window in windows]
+            # Around convex corners of a part more is lost in the wide window, if not at a sample.
+            for window, (now, then) in zip(windows[1:], pairwise(lost), strict=True):
+                around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
+                flagged[part] |= (now > limit) & (around[1] < LOSS_GROWTH * around[0])
     x = places[flagged]
     return np.column_stack([x, _widths(kind, function, view, x, spacing)]), values
 
