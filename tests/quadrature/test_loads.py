@@ -73,7 +73,7 @@ def test_a_small_patch_of_body_force_is_not_lost(x, y):
 
 @pytest.mark.parametrize("start", [0.0, 0.3, 0.96, 0.962])
 def test_narrow_loads_on_two_triangles_are_not_lost(start):
-    """No point of a lattice need be in them; from .96 on what is left beside the layer is narrow."""
+    """No point of a lattice need be in them; from .96 on what is left beside a layer is narrow."""
     problem = loaded(
         traction={"top": 1000 * box(ng.x, start, 1e-3)},
         force={"body": (0, -100 * box(ng.y, start, 0.01))},
