@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -39,6 +41,15 @@ def matched_vertices(trace: BoundaryTrace, contact: Contact) -> Index:
         met = vertex >= 0
         partner[0, line.node[met]], partner[1, vertex[met]] = vertex[met], line.node[met]
     return partner
+
+
+def _of_primaries(contacts: Iterable[Contact]) -> list[Contact]:
+    """Contact of each primary along one direction with all its secondaries, as if one pair."""
+    secondaries: dict[Any, list[str]] = defaultdict(list)
+    for contact in contacts:
+        if contact.primary is not None:
+            secondaries[contact.primary, contact.direction].append(contact.secondary)
+    return [Contact("|".join(names), *sides) for sides, names in secondaries.items()]
 
 
 def _by_edge(trace: BoundaryTrace, vertices: Index) -> Iterator[tuple[CadEdge, Index]]:
@@ -106,8 +117,8 @@ class Refining:
         self.problem, self.given = problem, mesh
         self.mesh = copied(mesh)
         self.origin = np.arange(mesh.ne)
-        self._paired = [contact for contact in problem.contact if contact.primary is not None]
-        # (2 p, nv), of each of p pairs what `matched_vertices` answers
+        self._paired = _of_primaries(problem.contact)
+        # (2 p, nv), of each of p primaries what `matched_vertices` answers
         self._partner = np.zeros((0, mesh.nv), dtype=np.intp)
         if self._paired:
             trace = boundary_trace(mesh, 1)
