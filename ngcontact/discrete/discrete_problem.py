@@ -257,14 +257,8 @@ def discretise(
 
     Of a `previous` problem with the same elements on the same mesh, what is the same is used
     again: the stiffness if the bodies are, the factorisation if also the rows and supports are.
-
-    Raises
-    ------
-    ValueError
-        A pair of which no point faces; prescribed displacements that violate a contact row;
-        forces or displacements beyond the range of numbers.
-    NoEquilibriumError
-        The load does work on a rigid motion that supports and contact admit.
+    Refused are a pair of which no point faces, prescribed displacements that violate a contact row,
+    forces or displacements beyond the range of numbers, and what `equilibrium` refuses.
     """
     trace = boundary_trace(mesh, order, model_of(problem))
     trace = for_partial_cover(trace, problem.contact)

@@ -195,13 +195,9 @@ def minimise(systems: BorderedSystems, active: Mask | None = None) -> Iterate:
     """Solve the quadratic program of `systems` by semismooth Newton steps.
 
     They begin with the first active set `active` (m,), the equalities alone when left out. The
-    result has the multipliers of all rows, equalities included.
-
-    Raises
-    ------
-    ConvergenceError
-        A system is singular, or the step limit was reached, to which only a matrix that is not
-        positive definite is known to lead; with the last `Iterate`.
+    result has the multipliers of all rows, equalities included. A singular system, and the step
+    limit, to which only a matrix that is not positive definite is known to lead, is a
+    `ConvergenceError` with the last `Iterate`.
     """
     p = systems.program
     current = ActiveSetIteration(  # (i)
