@@ -191,7 +191,7 @@ class IterativeSystems(BorderedSystems):
     """The linear systems of one program with unit rows, by conjugate gradients and multigrid.
 
     Each system starts from the iterate of the one before, and is solved as closely as telling
-    the next active set takes, to 1e-2 of its first residual; `refine` takes it to round-off. Where
+    the next active set takes, to 1e-2 of its first residual, or to round-off if so asked. Where
     V-cycles or active sets do not converge, and for proximal terms, which motions that nothing
     resists need, the matrix is factorised for good. `prepare` makes multigrid for the unknowns
     (n,) that are free.
@@ -220,49 +220,25 @@ class IterativeSystems(BorderedSystems):
         super().forget()
         self.multigrid = self.coarse = None
 
-    def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at 1e-2."""
-        if self._converges(anchor, lambda: self._iterate(active)):
-            return self.y.copy(), self.force.copy()
-        return super().solve(active, anchor)
+    def solve(
+        self, active: Mask, anchor: Anchor | None = None, *, refined: bool = False
+    ) -> tuple[Array, Array]:
+        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at 1e-2.
 
-    def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
-
-        def to_round_off() -> None:
-            if self.solved is None or (self.solved != active).any():
-                self._iterate(active)
-            multigrid = self.multigrid or self._held(active)
-            floor = TERM_ROUND_OFF * float(terms(self.program.K, self.y).max(initial=0.0))
-            target = max(FINE_RESIDUAL * self.scale, floor)
-            residual = self.unbalanced(active)
-            for _ in range(RESTARTS):
-                if multigrid.largest(residual) <= target:
-                    return
-                self._add(multigrid, residual, target)
-                residual = self.unbalanced(active)
-            if not multigrid.largest(residual) <= COARSE_RESIDUAL * self.scale:
-                raise StalledError(f"{RESTARTS} solutions left more than {target:.1e}")
-
-        if self._converges(anchor, to_round_off):
-            return self.y.copy(), self.force.copy()
-        return super().refine(active, anchor)
-
-    def _converges(self, anchor: Anchor | None, iterate: Callable[[], None]) -> bool:
-        """Iterate; whether that can be done, and has reached its target."""
-        if self.stalled:
-            return False
-        reason: object = "motions that nothing resists need it"
-        if anchor is None:
-            try:
-                iterate()
-                return True
-            except ArithmeticError as error:
-                reason = error
-        log.info("the matrix is factorised: %s", reason)
-        self.forget()
-        self.stalled = True
-        return False
+        Or `refined` to round-off.
+        """
+        if not self.stalled:
+            reason: object = "motions that nothing resists need it"
+            if anchor is None:
+                try:
+                    (self._refine if refined else self._iterate)(active)
+                    return self.y.copy(), self.force.copy()
+                except ArithmeticError as error:
+                    reason = error
+            log.info("the matrix is factorised: %s", reason)
+            self.forget()
+            self.stalled = True
+        return super().solve(active, anchor, refined=refined)
 
     def _held(self, active: Mask) -> Multigrid:
         """The solver for an active set; its coarse matrices may be those of another one."""
@@ -299,3 +275,19 @@ class IterativeSystems(BorderedSystems):
         self.back_solves += count
         self.y += x
         return count
+
+    def _refine(self, active: Mask) -> None:
+        """Reduce the residual of the solution for the active set to round-off."""
+        if self.solved is None or (self.solved != active).any():
+            self._iterate(active)
+        multigrid = self.multigrid or self._held(active)
+        floor = TERM_ROUND_OFF * float(terms(self.program.K, self.y).max(initial=0.0))
+        target = max(FINE_RESIDUAL * self.scale, floor)
+        residual = self.unbalanced(active)
+        for _ in range(RESTARTS):
+            if multigrid.largest(residual) <= target:
+                return
+            self._add(multigrid, residual, target)
+            residual = self.unbalanced(active)
+        if not multigrid.largest(residual) <= COARSE_RESIDUAL * self.scale:
+            raise StalledError(f"{RESTARTS} solutions left more than {target:.1e}")

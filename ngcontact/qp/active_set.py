@@ -167,7 +167,7 @@ class ActiveSetIteration:
             self.y, self.force = self.systems.solve(self.active, anchor)  # (iii)
             wrong = self._violated(CLEAR_TIE)
             if not wrong.any():
-                self.y, self.force = self.systems.refine(self.active, anchor)
+                self.y, self.force = self.systems.solve(self.active, anchor, refined=True)
                 wrong = self._violated(tie)
         except SingularError as singular:
             raise ConvergenceError(

@@ -77,8 +77,7 @@ class BorderedSystems:
     3. y = x - K_0^-1 V z
 
     Every solution corrects the one before, which leaves no residual outside of the border: the
-    next one costs the back-solves of its new columns alone. `solve` and `refine` may be called in
-    any order.
+    next one costs the back-solves of its new columns alone.
 
     Parameters
     ----------
@@ -126,13 +125,18 @@ class BorderedSystems:
         """Give the memory of the factorisation back; it is made again when asked for."""
         self.base = self.system = None
 
-    def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
+    def solve(
+        self, active: Mask, anchor: Anchor | None = None, *, refined: bool = False
+    ) -> tuple[Array, Array]:
         """Minimiser (n,) and multipliers (m,) with the rows `active` (m,) held at their bounds.
 
-        The residual is 1e-11 of the first one; `refine` takes it to round-off. A matrix that is
-        singular to working precision is a `SingularError`.
+        The residual is 1e-11 of the first one, or `refined` to round-off. A matrix that is singular
+        to working precision is a `SingularError`.
         """
-        self._improve(self._reach(active, anchor), COARSE_RESIDUAL)
+        system = self.system
+        if system is None or system.anchor is not anchor or (system.active != active).any():
+            system = self._reach(active, anchor)
+        self._improve(system, FINE_RESIDUAL if refined else COARSE_RESIDUAL)
         return self.y.copy(), self.force.copy()
 
     def approach(self, active: Mask) -> Array:
@@ -142,14 +146,6 @@ class BorderedSystems:
         """
         self._reach(active, None, LOOSE_RESIDUAL)
         return self.y.copy()
-
-    def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
-        system = self.system
-        if system is None or system.anchor is not anchor or (system.active != active).any():
-            system = self._reach(active, anchor)
-        self._improve(system, FINE_RESIDUAL)
-        return self.y.copy(), self.force.copy()
 
     def unbalanced(self, active: Mask, anchor: Anchor | None = None) -> Array:
         """Unbalanced force b - K y - R' force, (n,), less that of the proximal terms.
