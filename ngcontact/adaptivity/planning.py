@@ -212,18 +212,18 @@ def areas(corners: Array) -> Array:
 
 
 def depths(corners: Array, places: Array) -> Array:
-    """Least barycentric coordinates (...,) of `places` (..., 2), negative outside of triangles.
+    """Least barycentric coordinates (n, k) of `places` (k, 2), or (n, k, 2), negative outside.
 
-    Of triangles with `corners` (..., 3, 2).
+    Of each of the triangles with `corners` (n, 3, 2).
     """
-    inwards = across(np.roll(corners, -1, axis=-2) - corners)
-    height = np.einsum("...d,...id->...i", places, inwards) - (corners * inwards).sum(axis=-1)
-    return np.asarray(height.min(axis=-1) / (2 * areas(corners)))
+    inwards = across(np.roll(corners, -1, axis=1) - corners)
+    height = inwards @ np.swapaxes(places, -1, -2) - (corners * inwards).sum(axis=2)[..., None]
+    return np.asarray(height.min(axis=1) / (2 * areas(corners))[:, None])
 
 
 def touching(corners: Array, places: Array) -> Mask:
     """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
-    return depths(corners[:, None], places) >= -TOUCHING_COORDINATE
+    return depths(corners, places) >= -TOUCHING_COORDINATE
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,7 +352,7 @@ def _inside(places: Array, inside: Index, corners: Array, parent: Index) -> Inde
     for number in range(count.max()):
         several = np.flatnonzero((count[inside] > 1) & (number < count[inside]))
         part = order[first[inside[several]] + number]
-        depth = depths(corners[part], places[several])
+        depth = depths(corners[part], places[several, None])[:, 0]
         better = depth > deepest[several]
         found[several[better]], deepest[several[better]] = part[better], depth[better]
     return found
