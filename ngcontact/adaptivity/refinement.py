@@ -150,7 +150,8 @@ class Refining:
         """Match the vertices made since on facing segments; elements (j,) at segments that lag."""
         made = MeshArrays(self.mesh).facets
         made = np.unique(made[made >= self._first])
-        parents = np.array([self.mesh.GetParentVertices(v) for v in made.tolist()]).reshape(-1, 2)
+        each = [self.mesh.GetParentVertices(v) for v in made.tolist()]
+        parents = np.array(each, dtype=np.intp).reshape(-1, 2)
         more = self.mesh.nv - self._partner.shape[1]
         self._partner = np.pad(self._partner, ((0, 0), (0, more)), constant_values=-1)
         while True:  # those on halves of segments once the middles are matched

@@ -59,6 +59,7 @@ LARGEST_SUM = 15.0
 # curved sides psi, which is negative in places, made negative means of gaps that are positive.
 LARGEST_SLOPE = 0.01
 SMALLEST_SHARE = 1e-8  # of a point's weight on its whole segments, below which it carries no row
+ACROSS_SHARE = 0.5  # of a direction that is left across motions at least; else it stays as it is
 LENGTH_STEP = 1e-6  # of the longest, in which lengths of edges are counted: round-off is no tie
 
 # Which points (m,) of a line supports leave no displacement along their direction.
@@ -221,8 +222,10 @@ def _across_turns(line: ContactLine, place: Array, d: Array) -> Array:
 
     resisted = np.einsum("mi,mij->mj", line.direction, moved(line.position))
     along = moved(place) @ vanishing_combinations(resisted)
-    d = d - np.einsum("mij,mjk,mk->mi", along, np.linalg.pinv(along, SLIVER), d)
-    return np.asarray(d / np.linalg.norm(d, axis=1)[:, None])
+    left = d - np.einsum("mij,mjk,mk->mi", along, np.linalg.pinv(along, SLIVER), d)
+    size = np.linalg.norm(left, axis=1)[:, None]
+    # Few nodes resist few motions of faces that are neither round nor plane.
+    return np.where(size > ACROSS_SHARE, left / np.maximum(size, ACROSS_SHARE), d)
 
 
 def _in_line(place: Array, line: ContactLine, primary: Index, coupling: sp.csr_array) -> Array:

@@ -60,6 +60,12 @@ class ContactLine:
         return np.concatenate([np.column_stack([point[:-1], point[1:]])[same], self.twins])
 
     @cached_property
+    def links(self) -> Index:
+        """Pairs (l, 2) of contact points at nodes beside each other on a plane line; `twins`."""
+        pairs = np.stack([self.rows[:, :-1], self.rows[:, 1:]], axis=2).reshape(-1, 2)
+        return np.concatenate([pairs[(pairs >= 0).all(axis=1)], self.twins])
+
+    @cached_property
     def twins(self) -> Index:
         """Pairs (t, 2) of contact points that share a node, a corner."""
         order = np.argsort(self.node, kind="stable")

@@ -134,7 +134,7 @@ class ContactState:
         """
         if self.ends is not None:
             return self.ends
-        line, active, linked = self.line, self.in_contact, self.line.neighbours
+        line, active, linked = self.line, self.in_contact, self.line.links
         beside: dict[int, list[int]] = defaultdict(list)
         for a, b in linked.tolist():
             beside[a].append(b)

@@ -178,7 +178,7 @@ def zones_of(state: ContactState) -> ContactZones:
     line, m, corners = state.line, len(state.gap), state.line.twins
     closed, parts = state.active, line.rows
     if line.dim == 2:
-        closed, parts = state.in_contact, line.neighbours
+        closed, parts = state.in_contact, line.links
     met, opened = ((parts >= 0) & x[parts] for x in (closed, ~closed))
     first = parts[np.arange(len(parts)), met.argmax(axis=1)]
     label = _labels(np.array([(first[:, None] + 0 * parts)[met], parts[met]]).T, m)
@@ -400,7 +400,7 @@ def drawn_gap_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, f
     Means weighted by force; 0 where normals do not turn or the bodies are drawn touching. Errors up
     to `PEAK_ERROR` are upper bounds.
     """
-    line, force, along = state.line, np.abs(state.force), state.line.neighbours
+    line, force, along = state.line, np.abs(state.force), state.line.links
     along = along[np.diff(line.node[along], axis=1)[:, 0] != 0]
     weight = force[along].sum(axis=1)
     if not weight.any():

@@ -80,6 +80,19 @@ def test_six_levels_marked_on_one_side_only(name, side):
             assert np.abs(distance - radius).max() < ROUND_OFF
 
 
+def test_an_element_amid_a_body_is_refined_alone():
+    """No vertex of the boundary is new then, of which the other side would ask for its like."""
+    problem = BOUNDED["blocks"].problem()
+    mesh = first_mesh(problem, 0.1)
+    marked = np.zeros(mesh.ne, dtype=bool)
+    marked[np.linalg.norm(MeshArrays(mesh).corners.mean(axis=1) - [0.5, 0.5], axis=1).argmin()] = (
+        True
+    )
+    finer = refined(problem, mesh, marked)
+    assert finer.GetNE(ng.BND) == mesh.GetNE(ng.BND)
+    assert mesh.ne < finer.ne < mesh.ne + 60  # what one element takes along: measured 26
+
+
 def test_a_mesh_without_cad_stays_matched():
     x = np.linspace(-1, 1, 9)
     mesh = given = two_blocks(x, x)

@@ -1,6 +1,7 @@
 """Rows where nodes do not face nodes, against exact solutions that the elements contain."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, solve
+from ngcontact.contact.dual import _across_turns
 from ngcontact.geometries import blocks
 from tests.given_meshes import two_blocks
 from tests.scenes import divided, pressed
@@ -124,3 +126,13 @@ def test_sides_along_the_direction_carry_nothing(order):
         problem = replace(case.problem, geometry=mesh, contact=[pair], sliding=None, **loads)
         forces.append(solve(problem, order=order).force)
     np.testing.assert_allclose(forces[1], forces[0], rtol=EXACT)
+
+
+def test_few_nodes_of_a_curved_face_turn_no_direction_away():
+    """Three nodes resist three motions of six: what is left of d across the rest is round-off."""
+    x, y = np.random.default_rng(1).uniform(-0.5, 0.5, (2, 3))
+    position = np.column_stack([x, y, (x**2 + 2 * y**2) / 2])
+    d = np.column_stack([x, 2 * y, -np.ones(3)])
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    few = SimpleNamespace(position=position, direction=d)
+    assert (_across_turns(few, position, d) * d).sum(axis=1).min() > 0.5

@@ -17,7 +17,7 @@ from ngcontact.fem import MODELS
 class Points(SimpleNamespace):
     """The points of a contact line, and what these alone tell."""
 
-    neighbours, twins = ContactLine.neighbours, ContactLine.twins
+    links, twins = ContactLine.links, ContactLine.twins
 
 
 def line(x, order=1, y=None):
@@ -50,6 +50,16 @@ def test_the_model_end_is_found_exactly(end, order):
     [inner], [outer] = found.inner, found.outer
     assert x[inner] < end < x[outer]
     assert outer == inner + 1
+
+
+def test_points_beyond_a_node_without_one_tell_of_no_end():
+    """Their gaps are means over what faces of a long segment."""
+    x = np.linspace(0, 1, 25)
+    points, (gap, active) = line(x, 4), opening(x - 0.31)
+    points.rows[3, 1:-1] = -1
+    gap[16:] *= 3
+    found = state_of(points, gap, active).transitions
+    assert found.position == pytest.approx(np.array([[0.31, 0.0]]), abs=EXACT)
 
 
 def test_two_zones_have_four_ends():
