@@ -37,7 +37,6 @@ from .terms import (
     PressureShare,
     ScaledSolution,
     Squares,
-    fine_parts,
 )
 
 # Last step of Newton's method for a parameter: the next one would be its square.
@@ -48,6 +47,8 @@ SAME_DIRECTION_COSINE = 1 - 1e-6
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas.
 BUMP_FACTOR = 2.0
+# Parts of a line by which gaps that are functions are integrated: of 60 waves each has four.
+GAP_PIECES = 256
 
 
 def covered_parts(boundary: BoundaryTrace, zone: Zone, pieces: FacingPieces, whole: Mask) -> Parts:
@@ -87,14 +88,16 @@ def remaining(inner: Mask, covered: list[Parts]) -> Parts:
 def as_fine_as_gap(
     boundary: BoundaryTrace, contact: Contact, segments: Index, pieces: FacingPieces
 ) -> FacingPieces:
-    """Parts of the pieces of `segments` (k,), as of `fine_parts`, where the gap is a function."""
+    """Pieces of `segments` (k,) no longer than a `GAP_PIECES`-th of all, for gap functions."""
     if contact.gap is None or isinstance(contact.gap, float):
         return pieces
     size = boundary.lengths(segments)[pieces.local] * pieces.share
-    number, start, length = fine_parts(size, np.ones(len(size), dtype=bool))
-    pieces = rows_of(pieces, number)
-    start, share = pieces.start + pieces.share * start, pieces.share * length
-    return replace(pieces, corners=np.stack([start, start + share], axis=1), share=share)
+    count = np.ceil(GAP_PIECES * size / size.sum()).astype(np.intp)
+    number, first = np.arange(len(count)).repeat(count), np.cumsum(count) - count
+    share = (pieces.share / count)[number]
+    start = pieces.start[number] + share * (np.arange(len(number)) - first[number])
+    corners = np.stack([start, start + share], axis=1)
+    return replace(rows_of(pieces, number), corners=corners, share=share)
 
 
 def nodal_directions(boundary: BoundaryTrace, line: ContactLine) -> Array:

@@ -44,7 +44,7 @@ from ..arrays import Array, Index, Mask, power_of_two, root_of_squares, rows_of
 from ..fem import NEARLY_INCOMPRESSIBLE, law_measures, nearly_incompressible, rough_moduli
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
-from ..quadrature import features_of, loads_of, rough_segments
+from ..quadrature import features_of, loads_of, pieces, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, on_surfaces, remaining
 from .pressure_correction import pressure_correction
@@ -60,7 +60,6 @@ from .terms import (
     divergence_and_jump,
     edge_integral,
     element_integral,
-    fine_parts,
     oscillation,
 )
 
@@ -206,7 +205,7 @@ def _displacement(
     """
     boundary, order = solution.boundary, 2 * solution.order + DATA_BONUS
     points, weights = gauss(order)
-    u, count = solution.displacement, len(segments)
+    u, mesh, count = solution.displacement, solution.mesh, len(segments)
     missed = [value - u[axis] for axis, value in data.items()]
 
     def miss(number: Index, s: Array) -> Array:
@@ -217,16 +216,18 @@ def _displacement(
 
     number, start, length = np.arange(count), np.zeros(count), np.ones(count)
     w = miss(number, points[None].repeat(count, axis=0))
-    seen = solution.strain * np.abs(w).max()
-    rough = rough_segments([*data.values()], solution.mesh, segments, seen)
+    rough = rough_segments([*data.values()], mesh, segments, solution.strain * np.abs(w).max())
     if rough.any():
-        number, start, length = fine_parts(boundary.lengths(segments), rough)
+        found = pieces(miss, mesh, boundary.lengths(segments), np.flatnonzero(rough))
+        number = np.concatenate([number[~rough], found.element])
+        start = np.concatenate([start[~rough], found.origin[:, 0]])
+        length = np.concatenate([length[~rough], found.side[:, 0, 0]])
         w = miss(number, start[:, None] + length[:, None] * points)
     s = start[:, None] + length[:, None] * points
-    at = np.repeat(segments[number], len(points)), s.ravel()
-    stretch = np.linalg.norm(boundary.derivative(*at), axis=1).reshape(s.shape)
+    every = np.repeat(segments[number], len(points))
+    stretch = np.linalg.norm(boundary.derivative(every, s.ravel()), axis=1).reshape(s.shape)
     slope = (gauss_derivative(order) @ w) / (length[:, None] * stretch)[..., None]
-    measure = boundary.measure(*at).reshape(s.shape)
+    measure = boundary.measure(every, s.ravel()).reshape(s.shape)
     ds = (length[:, None] * weights * stretch * measure)[..., None]
     square, sloping = (np.bincount(number, (ds * x**2).sum(axis=(1, 2)), count) for x in (w, slope))
     element = boundary.element[segments]

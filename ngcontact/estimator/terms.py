@@ -16,7 +16,6 @@ from ..problem import Problem
 
 VOIGT = {3: [[0, 2], [2, 1]], 6: [[0, 5, 4], [5, 1, 3], [4, 3, 2]]}  # numbers, by components
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
-LINE_PARTS = 256  # of a line, by which functions on it are integrated: of 60 waves each has four
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,17 +56,6 @@ class Parts:
         length = (self.stop - self.start)[:, None]
         s, weights = self.start[:, None] + length * rule, length * weight
         return part, BoundaryPoints.at(boundary, self.segment[part], s.ravel(), weights.ravel())
-
-
-def fine_parts(size: Array, some: Mask) -> tuple[Index, Array, Array]:
-    """Parts of segments: `some` (k,) in equal ones, by `size` (k,), up to a `LINE_PARTS`-th of all.
-
-    The number (n,) of its segment, the start (n,) and the length (n,) of each on it; others whole.
-    """
-    count = np.where(some, np.ceil(LINE_PARTS * size / size[some].sum()), 1).astype(np.intp)
-    last, number = np.cumsum(count), np.arange(len(count)).repeat(count)
-    start = np.arange(last[-1]) - (last - count)[number]
-    return number, start / count[number], 1 / count[number]
 
 
 class PressureShare(NamedTuple):

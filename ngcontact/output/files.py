@@ -5,9 +5,19 @@ from __future__ import annotations
 import os
 import tempfile
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def several(solutions: Iterable[T]) -> Iterable[T]:
+    """The solutions; ``TypeError`` where they are no series, as one alone is none."""
+    if not isinstance(solutions, Iterable):
+        raise TypeError(f"solutions is a {type(solutions).__name__}: give a list of Solution")
+    return solutions
 
 
 def check_path(path: str | os.PathLike[str], suffix: str) -> Path:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Array, Index
 from ..solved import Solved
-from .files import check_path, replacing
+from .files import check_path, replacing, several
 from .scene import Scene, Style, coordinates, picture
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def write_film(
     from matplotlib.figure import Figure
     from PIL import Image
 
-    frames, style = list(solutions), Style(**options)
+    frames, style = list(several(solutions)), Style(**options)
     if not frames:
         raise ValueError("solutions: give one at least")
     if titles is not None and len(titles) != len(frames):
@@ -416,8 +416,9 @@ def _draw_pressure(axes: Axes, scene: Scene, part: Array) -> None:
     solution, style = scene.solution, scene.style
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     contact = solution.problem.contact
-    several, largest = len(contact) > 1, NO_PRESSURE * solution.pressure.max()
-    free = [k for k, one in enumerate(solution.pairs) if one.pressure.max(initial=0) < largest]
+    peaks = np.array([np.abs(one.pressure).max(initial=0.0) for one in solution.pairs])
+    free = np.flatnonzero(peaks < NO_PRESSURE * peaks.max(initial=0.0)).tolist()
+    several = len(contact) > 1
     for pair, rows, s in scene.lines:
         if pair in free:
             continue

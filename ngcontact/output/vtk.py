@@ -18,7 +18,7 @@ from ..estimator import Estimated
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
-from .files import check_path, replacing
+from .files import check_path, replacing, several
 from .nodes import in_space, nodes_of, order_of, sized, through
 from .surface import contact_surface
 
@@ -128,7 +128,7 @@ def write_series(
         clock = iter(values.tolist())
     root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     collection = ET.SubElement(root, "Collection")
-    for level, solution in enumerate(solutions):
+    for level, solution in enumerate(several(solutions)):
         time = float(level) if clock is None else next(clock, None)
         if time is None:
             raise ValueError(f"times has {level} entries, fewer than there are solutions")

@@ -10,6 +10,7 @@ from .features import unresolved as unresolved
 from .features import where_features_are as where_features_are
 from .loads import Load as Load
 from .loads import loads_of as loads_of
+from .loads import pieces as pieces
 from .loads import rough_load as rough_load
 from .loads import rough_segments as rough_segments
 from .loads import sample_data as sample_data

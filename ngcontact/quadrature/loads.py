@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,13 +14,14 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two, rows_of
 from ..errors import warn
-from ..problem import Problem, numbers
+from ..problem import MeshArrays, Problem, numbers
 from .cells import (
     MOMENTS,
     ElementParts,
     Refined,
     Rule,
     SampledElements,
+    divisions,
     gauss_rule,
     inward,
     local_functions,
@@ -46,6 +47,7 @@ LOST_SHARE = 1e-3  # of a load that quadrature may miss without a word
 MIN_SEGMENT_POINTS = 8  # points on a segment at least, which show any interpolation error
 ROUGH_MISS = 0.1  # what polynomials miss of values, relative to what the mesh does: they are rough
 VALUE_ROUND_OFF = 1e-10  # ... and relative to the values
+SQUARES_ERROR = 1e-3  # error of the squares on a part, relative to all of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,3 +248,19 @@ def rough_segments(
         left[here] = missed_by_polynomials(found, 1)
         largest = max(largest, float(np.abs(found).max()))
     return np.asarray(left[segments] > max(ROUGH_MISS * missed, VALUE_ROUND_OFF * largest))
+
+
+def pieces(
+    miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
+) -> ElementParts:
+    """Pieces of segments `at` (k,) on which Gauss points integrate the squares of what is missed.
+
+    `miss` has values (k, m, c) at parameters (k, m) of segments (k,) of lengths `sizes` (q,).
+    """
+
+    def squares(segment: Index, s: Array) -> Array:
+        return np.asarray(sizes[segment, None, None] * miss(segment, s[..., 0]) ** 2)
+
+    n = max(MIN_SEGMENT_POINTS, int(divisions(1, sizes[at], MeshArrays(mesh).extent).max()))
+    cells = ElementParts.whole(1, at).divided(n)
+    return refined(squares, cells, MOMENTS, SQUARES_ERROR).cells

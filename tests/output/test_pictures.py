@@ -246,3 +246,21 @@ def test_pairs_without_pressure_are_named(tmp_path):
     [profile] = [axes for axes in figure.axes if axes.get_title() == "contact pressure"]
     labels = [text.get_text() for text in profile.get_legend().get_texts()]
     assert labels == ["pair 0: disc_arc", "in contact", "open", "without pressure:\npair 1"]
+
+
+def test_tension_of_a_bilateral_pair_is_drawn(tmp_path):
+    """Three times the pressure of the other pair, on columns of one shape."""
+    x, y = {"a": 0, "b": 0, "c": 3, "d": 3}, {"a": -1, "b": 0, "c": -1, "d": 0}
+    bodies = [rectangle(n, (x[n], x[n] + 1), (y[n], y[n] + 1)) for n in "abcd"]
+    problem = Problem(
+        geometry=compound(*bodies),
+        materials={"a|b|c|d": Elastic(E=1.0, nu=0.3)},
+        displacement={"a_bottom|c_bottom": (0, 0), "b_top": (0, -0.01), "d_top": (0, 0.03)},
+        contact=[Contact("b_bottom", "a_top"), Contact("d_bottom", "c_top", bilateral=True)],
+    )
+    solution = solve(problem, maxh=0.5, order=2)
+    figure = plot_solution(solution, tmp_path / "a.png")
+    drawn = [line.get_ydata() for axes in figure.axes for line in axes.lines]
+    lowest = solution.pressure.min()
+    assert lowest < -2 * solution.pressure.max()
+    assert any(len(y) and np.min(y) == pytest.approx(lowest) for y in drawn)
