@@ -14,7 +14,6 @@ from .bound import Proof, largest
 from .cells import Cells
 from .facing import POINTS, FacingSides, bernstein, fitted, jump, opposite_points
 from .lifting import lifted
-from .program import LIMIT_SLACK, AdmissibleStress, DualProblem
 
 JUMP_NOISE = 1e-13  # of a jump, relative to the largest displacement
 LIFTING_DEGREE = 3  # degree of w on these: higher ones take 2 % off the bar and twice the time
@@ -54,11 +53,14 @@ def force_bar(
         )
     problem = proof.problem
     test = dual.of_strain(model_of(problem).strain(G))
-    t, ratio = _within(test, stress.force, np.inf)
-    least = max(kappa, KAPPA_GROWTH * t.size / B if B > 0 else 0.0)
-    if ratio > LIMIT_SLACK * least:
-        t, ratio = _within(test, stress.force, least, t)
-    kappa = max(kappa, ratio, t.size / B if B > 0 else 0.0)  # up to M / B it costs nothing
+    t = test.nearest(
+        pressed=stress.force,
+        limit=lambda size: max(kappa, KAPPA_GROWTH * size / B if B > 0 else 0.0),
+    )
+    pressed = ~test.program.equality & (stress.force > 0)
+    ratio = np.abs(t.force[pressed] / stress.force[pressed]).max(initial=0.0)
+    # Up to M / B kappa costs nothing.
+    kappa = max(kappa, float(ratio), t.size / B if B > 0 else 0.0)
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     r = []
     for f, (x, y) in zip(lines, excess, strict=True):
@@ -70,25 +72,11 @@ def force_bar(
     M = float(np.linalg.norm(t.distance + t.loads + w))
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
     error = M * B if M >= kappa * B else (M**2 / kappa + kappa * B**2) / 2
-    pressed = zip(lines, stress.pressure, r, strict=True)
-    opened = sum(float((f.force(p) * opening).sum()) for f, p, opening in pressed)
+    each = zip(lines, stress.pressure, r, strict=True)
+    opened = sum(float((f.force(p) * opening).sum()) for f, p, opening in each)
     crossed = float((stress.distance + stress.loads) @ w)
     on_motions = stress.free_force and stress.free_force * largest(test.elements, G)
     return error + abs(t.work) + crossed + abs(opened) + on_motions
-
-
-def _within(
-    test: DualProblem, force: Array, kappa: float, start: AdmissibleStress | None = None
-) -> tuple[AdmissibleStress, float]:
-    """The stress near to that of G with |q*| <= kappa p*, and the largest |q*| / p*.
-
-    `force` (m,) are those of p*. Any q* where they have any sign.
-    """
-    pressed = ~test.program.equality & (force > 0)
-    limits = np.where(test.program.equality, np.inf, 0.0)
-    limits[pressed] = kappa * force[pressed]
-    found = test.nearest(limits=limits, start=start)
-    return found, float(np.abs(found.force[pressed] / force[pressed]).max(initial=0.0))
 
 
 def _excess(cells: Cells, G: ng.GridFunction, f: FacingSides, e: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ psi_j Bernstein polynomials: a quadratic program whose forces are the coefficien
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -107,14 +107,15 @@ class DualProblem:
     def nearest(
         self,
         least: float = 0.0,
-        limits: Array | None = None,
-        start: AdmissibleStress | None = None,
+        pressed: Array | None = None,
+        limit: Callable[[float], float] | None = None,
     ) -> AdmissibleStress:
         """The admissible stress that minimises B^2, with p* >= 0.
 
-        With `limits` (m,), not negative: one near to the strain without a gap, of which forces on
-        rows are at most `LIMIT_SLACK` times these; it may be made from another one, `start`.
-        Residuals are relative to the largest stress, which counts as `least` at the least.
+        With `pressed` (m,), forces of another one: one near to the strain without a gap. Its forces
+        are at most `LIMIT_SLACK` kappa times these, kappa as `limit` makes it of |s - C e|; any
+        where they have any sign. Residuals are relative to the largest stress, which counts as
+        `least` at the least.
 
         Raises
         ------
@@ -133,14 +134,11 @@ class DualProblem:
                 "refine where they vary, or hold the body"
             )
         moments, y = moments - idle, np.zeros(len(p.b))
-        if limits is None:
-            low, high = np.where(p.equality, -np.inf, 0.0), np.full(len(p.g), np.inf)
-            active = _joined([x.pressed for x in self.lines], bool)
-        else:
-            low, high, active = -limits, limits, limits > 0
-        if start is not None:
-            s = start.s
-        elif limits is None and len(active):
+        one_sided, high = ~p.equality, np.full(len(p.g), np.inf)
+        low = np.where(one_sided & (pressed is None), 0.0, -np.inf)
+        if pressed is not None:
+            active = p.equality | (pressed > 0)
+        elif len(active := _joined([x.pressed for x in self.lines], bool)):
             self.systems.restart(replace(p, b=self.T.T @ (moments - alone)))
             found = minimise(self.systems, active)
             y, active = found.u, found.active
@@ -155,6 +153,10 @@ class DualProblem:
             left = moments - total
             left -= self._on_free_motions(left)
             force = np.where(active, (self.T.T @ left)[p.unknown], force)
+            if pressed is not None and limit is not None and last < np.inf:
+                kappa, limit = limit(float(np.linalg.norm(s.norms()[0]))), None
+                high[one_sided] = kappa * pressed[one_sided]
+                low[one_sided] = -high[one_sided]
             beyond = active & ((force < LIMIT_SLACK * low) | (force > LIMIT_SLACK * high))
             active, force = active & ~beyond, np.where(beyond, np.clip(force, low, high), force)
             left = np.where(p.fixed, 0.0, left - self.R.T @ force)
