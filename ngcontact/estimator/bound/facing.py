@@ -41,7 +41,7 @@ SIDE_OVERHANG = 1e-9  # of a side, by which it may exceed the one it faces; 1e-1
 CONTACT_MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 VERTEX_DISTANCE = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 NARROW_SIDE = 0.1  # of the sides beside it, a side between them on which r does not change
-ACROSS_MOTION = 0.1  # cosine of the angle to prescribed motions, up to which d is across them
+PARALLEL_MOTION = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 POINTS, WEIGHTS = gauss(2 * DATA_DEGREE)
 # From values at `POINTS` to Legendre's coefficients, and to values at Gauss-Lobatto points.
 LEGENDRE = legendre.legvander(2 * POINTS - 1, DATA_DEGREE)
@@ -418,7 +418,9 @@ def held_motions(
 
 def _moves(held: Array, d: Array) -> Mask:
     """Whether vertices (k, 2) can move along `d` (k, 2, 2); `held` are as of `held_motions`."""
-    return np.einsum("kec,kecb,keb->ke", d, held, d) <= ACROSS_MOTION**2
+    onto = held @ np.linalg.pinv(held, rcond=PARALLEL_MOTION**2, hermitian=True)
+    rest = d - (onto @ d[..., None])[..., 0]
+    return np.asarray(np.linalg.norm(rest, axis=2) > PARALLEL_MOTION)
 
 
 def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:
