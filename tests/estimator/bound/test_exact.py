@@ -151,6 +151,16 @@ def test_straight_segments_for_circles(make):
 
 
 @pytest.mark.parametrize(
+    ("make", "order"),
+    [(cases.ring_in_bearing, 3), (cases.ring_in_bearing, 4), (cases.ring_in_ring, 3)],
+)
+def test_coarse_curves(make, order):
+    """Measured 1.017, 1.005, 1.028; 1.21 and no bounds where one bisection counts as enough."""
+    case = make()
+    assert 0.995 <= effectivity(solve(case.problem, maxh=0.6, order=order), case.exact) <= 1.05
+
+
+@pytest.mark.parametrize(
     ("make", "order", "size"),
     [
         *((cases.clamped_transition, *row) for row in ((1, 400), (2, 1300), (4, 4000))),

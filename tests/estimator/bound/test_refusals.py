@@ -70,3 +70,9 @@ def test_rows_where_nodes_do_not_face_nodes(rows, angle):
     down = {"bottom": (0, 0), "top": (0, -0.01)}
     problem = cases.touching_blocks(down, geometry=mesh, contact=[pair])
     assert solve(problem).relative_error_bound < 1
+
+
+def test_only_an_axis_is_named_as_one(monkeypatch):
+    monkeypatch.setattr("ngcontact.estimator.bound.bound.CURVED_RATIO", 0.0)
+    with pytest.raises(ValueError, match="no polynomials where curves turn far"):
+        _ = solve(cases.ring_in_bearing().problem, maxh=0.6, order=4).error_bound
