@@ -182,17 +182,6 @@ def test_differences_see_a_difference():
         assert 5e-7 < off < 2e-6
 
 
-@pytest.mark.parametrize("load", [1e-300, 1e300])
-@pytest.mark.study(witness=["1e-300"])
-def test_adaptive_runs_do_not_depend_on_the_load(load):
-    one, other = (
-        [s.displacement.space.ndof for s in adapt(posed(cornered, m), order=2, max_dofs=1500)]
-        for m in (AS_IT_IS, Motion("load", load=load))
-    )
-    assert len(one) > 1
-    assert other == one
-
-
 def test_estimate_that_is_no_number_ends_a_run(monkeypatch):
     """It would mark no element, and the same mesh would be solved for ever."""
     monkeypatch.setattr(Solution, "error_estimate", property(lambda self: float("nan")))

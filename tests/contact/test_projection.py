@@ -66,21 +66,6 @@ def test_rays_that_cross_a_segment_twice(count, degree):
     np.testing.assert_allclose(found.distance[met], expected[met], atol=1e-11)
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_rays_through_vertices_find_the_vertex(degree):
-    knots = np.array([-1, -0.3, 0.1, 0.7, 1])
-    curve = graph(lambda x: x**2 / 2, knots, degree)
-    for shift in (0.0, 1e-11, -1e-11):  # within MATCHED of the segments' lengths
-        points, directions = rays(np.column_stack([knots + shift, np.ones(5)]), DOWN)
-        found = cast(points, directions, curve, upward(curve))
-        assert (found.segment >= 0).all()
-        assert np.isin(found.s, (0.0, 1.0)).all()
-        np.testing.assert_allclose(at(curve, found)[:, 0], knots, atol=1e-15)
-        np.testing.assert_allclose(found.distance, 1 - knots**2 / 2, atol=1e-15)
-    beyond = cast(*rays([[1 + 1e-6, 1.0]], DOWN), curve, upward(curve))
-    assert beyond.segment.tolist() == [-1]
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_coincident_nodes(order):
     curve = graph(lambda x: 0.3 * x, [0, 0.4, 1])
