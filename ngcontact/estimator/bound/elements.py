@@ -282,10 +282,12 @@ def projection(force: ng.CoefficientFunction, points: Places, degree: int) -> tu
     And L2 norms (b,) of what they miss, times the measure; axially about an axis.
     """
     P, values = scalars(degree, points.corners, points.x), points.evaluate(force)
-    weighted = P.transpose(0, 2, 1) * points.weight[:, None]
-    mass = weighted @ P
-    found = np.linalg.solve(mass, weighted @ values)
-    found += np.linalg.solve(mass, weighted @ (values - P @ found))
+    weighted, root = P * points.weight[..., None], np.sqrt(points.weight)[..., None]
+    # Orthonormal ones: the normal equations of P are singular on flat triangles.
+    combined = _inverses(np.asarray(np.linalg.qr(root * P, mode="r")))
+    onto = combined @ (weighted @ combined).transpose(0, 2, 1)
+    found = onto @ values
+    found += onto @ (values - P @ found)
     weight = points.weight * points.cells.measure(points.x)
     axial = points.cells.trace.model.extent
     missed, size = (
