@@ -476,8 +476,8 @@ def levels(
             error = estimate
             if excluded.any():  # no mesh makes the estimate less there
                 error *= root_of_squares(solution.indicators[~excluded]) / solution.error_estimate
-        exact = error <= EXACT_ESTIMATE or at_round_off(solution, solution.error_estimate)
-        if not unresolved_data and (error <= goal or exact):
+        enough = error <= max(goal, EXACT_ESTIMATE)
+        if not unresolved_data and (enough or at_round_off(solution, solution.error_estimate)):
             return
         expected = ratio * estimate if guaranteed else error
         of_data = np.any([np.zeros_like(excluded), *unresolved_data.values()], axis=0)

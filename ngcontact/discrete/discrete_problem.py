@@ -433,9 +433,8 @@ def _carried(new: ContactLine, old: ContactState) -> Mask:
     tied = distance[:, 1] <= (1 + DISTANCE_ROUND_OFF) * away
     active: Mask = old.active[nearest] | (tied & old.active[near[:, 1]])
     order, ends = known.rows.shape[1] - 1, old.transitions if known.dim == 2 else None
-    if (
-        order > 1 and ends is not None and len(ends.inner) and away.max(initial=0.0) > size
-    ):  # other points
+    elsewhere = away.max(initial=0.0) > size  # else the points are the same
+    if order > 1 and elsewhere and ends is not None and len(ends.inner):
         around = np.isin(nearest, [ends.inner, ends.outer])
         end = cKDTree(ends.position).query(new.position)[1]  # the nearest one tells
         inwards = (known.position[ends.inner] - known.position[ends.outer])[end]

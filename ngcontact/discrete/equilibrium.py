@@ -219,7 +219,7 @@ class Rigid:
     """The r rigid motions that supports leave free, the load and the contact rows on them."""
 
     free: FreeMotions
-    gram: Array  # (r, r) integrals of their products over the boundaries of the bodies
+    gram: Array  # (r, r) products of the motions, over the boundaries where work is left
     rows: Array  # (m, r) left sides of the contact rows, lengths
     work: Array  # (r,) of the load, before what quadrature left of it was taken out
     motions: Columns  # (d * n, r) in the unknowns of the program
